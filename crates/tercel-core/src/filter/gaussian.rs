@@ -1,0 +1,57 @@
+//! What every filter with a Gaussian belief answers alike.
+
+use nalgebra::{SMatrix, Vector2};
+
+use crate::belief::Gaussian;
+use crate::sensor::Sensor;
+
+/// The methods of [`Filter`](super::Filter) that follow from a Gaussian belief and a field `sensor` of `$m` components.
+macro_rules! gaussian_belief {
+    ($m:ident) => {
+        fn state(&self, belief: &Gaussian<N>) -> Gaussian<N> {
+            *belief
+        }
+
+        fn set_state(&self, belief: &mut Gaussian<N>, state: &Gaussian<N>) {
+            *belief = *state;
+        }
+
+        fn merge(&self, belief: &mut Gaussian<N>, weight: f64, other: &Gaussian<N>, other_weight: f64) {
+            belief.merge(weight, other, other_weight);
+        }
+
+        fn distance(&self, belief: &Gaussian<N>, other: &Gaussian<N>, limit: f64) -> f64 {
+            belief.mahalanobis_within(&other.mean, limit)
+        }
+
+        fn reach(
+            &self,
+            belief: &Gaussian<N>,
+        ) -> Option<(nalgebra::Vector2<f64>, nalgebra::SMatrix<f64, 2, 2>)> {
+            crate::filter::gaussian::reach(&self.sensor, belief)
+        }
+
+        fn place(&self, measurement: &Measurement<$m>) -> Option<nalgebra::Vector2<f64>> {
+            self.sensor.place(measurement)
+        }
+
+        fn area(&self, measurement: &Measurement<$m>) -> f64 {
+            self.sensor.area(measurement)
+        }
+    };
+}
+pub(super) use gaussian_belief;
+
+/// Expected place of a measurement of a Gaussian belief, and the covariance of the difference.
+pub(super) fn reach<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    belief: &Gaussian<N>,
+) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+    if N < 2 {
+        return None;
+    }
+    let spread = sensor.spread(&belief.mean)?;
+    let place = sensor.place(&sensor.expected(&belief.mean).into())?;
+    let position = SMatrix::from_fn(|i, j| belief.covariance[(i, j)]);
+    Some((place, position + spread))
+}

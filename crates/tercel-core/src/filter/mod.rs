@@ -1,0 +1,178 @@
+//! Recursions that estimate one object: predict over a time step, update with a measurement.
+//!
+//! | filter | belief | for |
+//! |---|---|---|
+//! | [`Kalman`] | Gaussian | linear motion and sensor: exact |
+//! | [`Extended`] | Gaussian | smooth motion and sensor: first order |
+
+mod correction;
+mod estimate;
+mod extended;
+mod gaussian;
+mod innovation;
+mod kalman;
+
+use nalgebra::{SMatrix, Vector2};
+
+use crate::belief::Gaussian;
+use crate::error::FilterError;
+
+pub use estimate::Estimate;
+pub use extended::Extended;
+pub use innovation::Innovation;
+pub use kalman::Kalman;
+
+/// A recursion over a belief about one object, whose state has `N` components.
+///
+/// A filter holds what is known of the world (how objects move, what the sensor does); all that is known of one object
+/// is in the belief. So one filter serves any number of objects, beliefs can be copied, stored and compared, and a belief
+/// may be updated by different filters (a radar's, a lidar's) as long as they share its type.
+///
+/// Beliefs change in place, which lets filters with memories of any size work without allocating. A missing measurement
+/// is a [`predict`](Filter::predict) that no [`update`](Filter::update) follows.
+///
+/// ```
+/// use tercel_core::{belief::Gaussian, filter::{Filter, Kalman}, motion::ConstantVelocity, sensor::Position};
+///
+/// let filter = Kalman::new(ConstantVelocity::new(0.5), Position::new(5.0)?);
+/// let mut belief: Gaussian<4> = filter.birth(&[0.0, 0.0].into())?;
+/// for second in 1..=10 {
+///     filter.predict(&mut belief, 1.0);
+///     let innovation = filter.update(&mut belief, &[12.0 * second as f64, 0.0].into())?;
+///     assert!(innovation.nis < 9.21); // the 99 % gate of two components
+/// }
+/// assert!((belief.mean[2] - 12.0).abs() < 1.0);
+/// # Ok::<(), tercel_core::error::FilterError>(())
+/// ```
+pub trait Filter<const N: usize> {
+    /// All that is known of one object.
+    type Belief: Clone;
+    /// What a sensor says of one object at one time.
+    type Measurement;
+
+    /// The belief about a new object that caused this measurement.
+    ///
+    /// # Errors
+    /// When the measurement is not finite, or does not say where the object is.
+    fn birth(&self, measurement: &Self::Measurement) -> Result<Self::Belief, FilterError>;
+
+    /// Moves the belief forward by `dt` seconds, `dt >= 0`.
+    fn predict(&self, belief: &mut Self::Belief, dt: f64);
+
+    /// Conditions the belief on a measurement, and says how well the two agreed.
+    ///
+    /// # Errors
+    /// When the measurement is not finite or a covariance cannot be saved. The belief is then unchanged.
+    fn update(
+        &self,
+        belief: &mut Self::Belief,
+        measurement: &Self::Measurement,
+    ) -> Result<Innovation, FilterError>;
+
+    /// What [`update`](Filter::update) would return, without updating.
+    ///
+    /// # Errors
+    /// As `update`.
+    fn innovation(
+        &self,
+        belief: &Self::Belief,
+        measurement: &Self::Measurement,
+    ) -> Result<Innovation, FilterError> {
+        self.update(&mut belief.clone(), measurement)
+    }
+
+    /// Mean and covariance of the state.
+    fn state(&self, belief: &Self::Belief) -> Gaussian<N>;
+
+    /// Replaces mean and covariance of the state and leaves the rest of the belief (memories) as it is: the step by which
+    /// an interacting multiple model filter mixes its modes.
+    fn set_state(&self, belief: &mut Self::Belief, state: &Gaussian<N>);
+
+    /// Folds `other` into `belief`, so that it has the moments of the two with these weights. The weights need not be
+    /// normalised, and folding one after the other gives the moments of them all.
+    fn merge(&self, belief: &mut Self::Belief, weight: f64, other: &Self::Belief, other_weight: f64);
+
+    /// Squared Mahalanobis distance between two beliefs, with the covariance of the first; infinity stands for any
+    /// distance above `limit`.
+    fn distance(&self, belief: &Self::Belief, other: &Self::Belief, limit: f64) -> f64 {
+        self.state(belief).mahalanobis_within(&self.state(other).mean, limit)
+    }
+
+    /// What a user wants to know of the object.
+    fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
+        self.state(belief).into()
+    }
+
+    /// The part of the plane in which measurements of this object may lie: their expected place, and the covariance of the
+    /// difference. `None` when measurements have no place, and every one must be compared.
+    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)>;
+
+    /// Where in the plane a measurement lies, if it says so.
+    fn place(&self, measurement: &Self::Measurement) -> Option<Vector2<f64>>;
+
+    /// Area of the plane (m²) per unit volume of the measurement space, which turns a clutter intensity per m² into one
+    /// that compares with the likelihoods of this filter.
+    fn area(&self, measurement: &Self::Measurement) -> f64;
+
+    /// Moves many beliefs forward. Filters that work faster on batches override it.
+    fn predict_all(&self, beliefs: &mut [Self::Belief], dt: f64) {
+        for belief in beliefs {
+            self.predict(belief, dt);
+        }
+    }
+}
+
+/// A boxed filter is a filter: filters of different types stand side by side as `Box<dyn Filter<..>>`, as long as
+/// their beliefs and measurements agree.
+impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
+    type Belief = F::Belief;
+    type Measurement = F::Measurement;
+
+    fn birth(&self, measurement: &Self::Measurement) -> Result<Self::Belief, FilterError> {
+        (**self).birth(measurement)
+    }
+    fn predict(&self, belief: &mut Self::Belief, dt: f64) {
+        (**self).predict(belief, dt);
+    }
+    fn update(
+        &self,
+        belief: &mut Self::Belief,
+        measurement: &Self::Measurement,
+    ) -> Result<Innovation, FilterError> {
+        (**self).update(belief, measurement)
+    }
+    fn innovation(
+        &self,
+        belief: &Self::Belief,
+        measurement: &Self::Measurement,
+    ) -> Result<Innovation, FilterError> {
+        (**self).innovation(belief, measurement)
+    }
+    fn state(&self, belief: &Self::Belief) -> Gaussian<N> {
+        (**self).state(belief)
+    }
+    fn set_state(&self, belief: &mut Self::Belief, state: &Gaussian<N>) {
+        (**self).set_state(belief, state);
+    }
+    fn merge(&self, belief: &mut Self::Belief, weight: f64, other: &Self::Belief, other_weight: f64) {
+        (**self).merge(belief, weight, other, other_weight);
+    }
+    fn distance(&self, belief: &Self::Belief, other: &Self::Belief, limit: f64) -> f64 {
+        (**self).distance(belief, other, limit)
+    }
+    fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
+        (**self).estimate(belief)
+    }
+    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+        (**self).reach(belief)
+    }
+    fn place(&self, measurement: &Self::Measurement) -> Option<Vector2<f64>> {
+        (**self).place(measurement)
+    }
+    fn area(&self, measurement: &Self::Measurement) -> f64 {
+        (**self).area(measurement)
+    }
+    fn predict_all(&self, beliefs: &mut [Self::Belief], dt: f64) {
+        (**self).predict_all(beliefs, dt);
+    }
+}

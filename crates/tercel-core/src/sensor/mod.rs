@@ -1,0 +1,186 @@
+//! What a sensor would measure of an object, how accurately, and where a measurement puts an object.
+//!
+//! | sensor | measures |
+//! |---|---|
+//! | [`Position`] | Cartesian position, in the plane or in space |
+//! | [`ConvertedPolar`] | range and bearing, turned into a position with a rotated, debiased covariance |
+//! | [`RangeBearing`] | range and bearing |
+//! | [`RangeBearingRate`] | range, bearing and range rate |
+//! | [`BearingOnly`] | bearing |
+//!
+//! Bearings are mathematical: zero along `x`, counter-clockwise. Every sensor stands somewhere and may be moved between
+//! scans: sensors are small values, so a moved one is simply a new one.
+
+mod bearing_only;
+mod converted_polar;
+mod position;
+mod range_bearing;
+mod range_bearing_rate;
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{SMatrix, SVector, Vector2};
+
+use crate::belief::Gaussian;
+use crate::error::FilterError;
+
+pub use bearing_only::BearingOnly;
+pub use converted_polar::ConvertedPolar;
+pub use position::Position;
+pub use range_bearing::RangeBearing;
+pub use range_bearing_rate::RangeBearingRate;
+
+/// One measurement of `M` components, with its own noise covariance when the sensor reports one.
+///
+/// ```
+/// use tercel_core::sensor::Measurement;
+///
+/// let plot: Measurement<2> = [1200.0, 0.3].into();
+/// assert_eq!(plot.noise, None);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurement<const M: usize> {
+    /// What was measured, in the sensor's components and order.
+    pub value: SVector<f64, M>,
+    /// Covariance of the error of `value`, when it comes with the measurement; otherwise the sensor's own holds.
+    pub noise: Option<SMatrix<f64, M, M>>,
+}
+
+impl<const M: usize> From<[f64; M]> for Measurement<M> {
+    fn from(value: [f64; M]) -> Self {
+        Measurement { value: value.into(), noise: None }
+    }
+}
+
+impl<const M: usize> From<SVector<f64, M>> for Measurement<M> {
+    fn from(value: SVector<f64, M>) -> Self {
+        Measurement { value, noise: None }
+    }
+}
+
+impl<const M: usize> Measurement<M> {
+    /// The same measurement with its own noise covariance.
+    pub fn with_noise(self, noise: SMatrix<f64, M, M>) -> Self {
+        Measurement { noise: Some(noise), ..self }
+    }
+}
+
+/// A measurement in the components in which a filter compares it with what was expected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading<const M: usize> {
+    /// The measured components.
+    pub value: SVector<f64, M>,
+    /// Covariance of their errors.
+    pub noise: SMatrix<f64, M, M>,
+}
+
+/// A sensor that measures `M` components of a state of `N` components.
+///
+/// The state begins with positions, as [`Gaussian`] says.
+pub trait Sensor<const N: usize, const M: usize> {
+    /// What the sensor would read of an object in this state, without noise.
+    fn expected(&self, state: &SVector<f64, N>) -> SVector<f64, M>;
+
+    /// Derivative of [`expected`](Sensor::expected) with respect to the state.
+    fn jacobian(&self, state: &SVector<f64, N>) -> SMatrix<f64, M, N>;
+
+    /// Covariance of the reading's error for an object whose expected reading is `expected`.
+    fn noise(&self, expected: &SVector<f64, M>) -> SMatrix<f64, M, M>;
+
+    /// A measurement as a reading. The default takes its value as it is and prefers its own noise.
+    #[inline]
+    fn read(&self, measurement: &Measurement<M>) -> Reading<M> {
+        let noise = match measurement.noise {
+            Some(noise) => noise,
+            None => self.noise(&measurement.value),
+        };
+        Reading { value: measurement.value, noise }
+    }
+
+    /// Which components of a reading are angles, and so periodic.
+    fn periodic(&self) -> [bool; M] {
+        [false; M]
+    }
+
+    /// `reading - expected`, with angles between -π and π.
+    #[inline]
+    fn difference(&self, reading: &SVector<f64, M>, expected: &SVector<f64, M>) -> SVector<f64, M> {
+        let mut difference = reading - expected;
+        for (component, periodic) in difference.iter_mut().zip(self.periodic()) {
+            if periodic {
+                *component = wrapped(*component);
+            }
+        }
+        difference
+    }
+
+    /// What is believed of a new object that caused this measurement, given what was believed of any new object:
+    /// its position comes from the measurement, the rest from `prior`.
+    ///
+    /// # Errors
+    /// [`FilterError::NotInvertible`] when the measurement does not say where the object is.
+    fn birth(&self, measurement: &Measurement<M>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError>;
+
+    /// Where in the plane (`x, y`) the measurement was taken to be, if it says so.
+    fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>>;
+
+    /// Covariance in the plane of the error of [`place`](Sensor::place), for an object in this state. Gates are
+    /// searched in the plane with it before readings are compared.
+    ///
+    /// `None` for sensors that do not say where an object is.
+    fn spread(&self, state: &SVector<f64, N>) -> Option<SMatrix<f64, 2, 2>>;
+
+    /// Area of the plane (m²) that one unit of volume of the reading's space covers near a measurement, so that a
+    /// clutter intensity given per m² becomes one per unit of the reading.
+    fn area(&self, _: &Measurement<M>) -> f64 {
+        1.0
+    }
+}
+
+/// A sensor whose [`jacobian`](Sensor::jacobian) does not depend on the state and whose readings are not periodic, which
+/// makes the Kalman filter exact.
+pub trait LinearSensor<const N: usize, const M: usize>: Sensor<N, M> {}
+
+impl<const N: usize, const M: usize> LinearSensor<N, M> for Position<M> {}
+impl<const N: usize> LinearSensor<N, 2> for ConvertedPolar {}
+
+/// The angle between -π and π that differs from `angle` by whole turns.
+#[inline]
+pub fn wrapped(angle: f64) -> f64 {
+    if angle.abs() <= PI {
+        return angle;
+    }
+    let turned = (angle + PI).rem_euclid(TAU) - PI;
+    // Rounding in the remainder may leave the interval by one unit in the last place.
+    turned.clamp(-PI, PI)
+}
+
+/// A birth with the position part of `prior` replaced by a position in the plane and its covariance, and everything
+/// else independent of it.
+fn placed<const N: usize>(
+    prior: &Gaussian<N>,
+    place: &Vector2<f64>,
+    covariance: &SMatrix<f64, 2, 2>,
+) -> Gaussian<N> {
+    let mut belief = *prior;
+    for i in 0..2 {
+        belief.mean[i] = place[i];
+        for j in 0..N {
+            belief.covariance[(i, j)] = if j < 2 { covariance[(i, j)] } else { 0.0 };
+            belief.covariance[(j, i)] = belief.covariance[(i, j)];
+        }
+    }
+    belief
+}
+
+/// Fails on a measurement that holds a number that is not finite.
+fn finite<const M: usize>(measurement: &Measurement<M>) -> Result<(), FilterError> {
+    let noise_is_finite = measurement.noise.is_none_or(|noise| noise.iter().all(|x| x.is_finite()));
+    if noise_is_finite && measurement.value.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(FilterError::NotFinite { what: "measurement" })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,117 @@
+use super::*;
+use crate::motion::{ConstantVelocity, Motion};
+use nalgebra::vector;
+
+/// Largest difference between the Jacobian and central differences of the expected reading.
+fn jacobian_error<const N: usize, const M: usize>(sensor: &impl Sensor<N, M>, state: SVector<f64, N>) -> f64 {
+    let jacobian = sensor.jacobian(&state);
+    let mut worst: f64 = 0.0;
+    for j in 0..N {
+        let step = 1e-5 * (1.0 + state[j].abs());
+        let (mut up, mut down) = (state, state);
+        up[j] += step;
+        down[j] -= step;
+        let slope = sensor.difference(&sensor.expected(&up), &sensor.expected(&down)) / (2.0 * step);
+        worst = worst.max((slope - jacobian.column(j)).amax());
+    }
+    worst
+}
+
+#[test]
+fn jacobians_are_the_derivatives_of_the_expected_readings() {
+    // The second state lies on the cut of the bearing.
+    for state in [vector![300.0, 400.0, 12.0, -5.0], vector![-500.0, 0.0, 3.0, 9.0]] {
+        let here = vector![20.0, 0.0];
+        assert!(jacobian_error(&Position::<2>::new(1.0).unwrap().with_lag(2.0), state) < 1e-8);
+        assert!(jacobian_error(&ConvertedPolar::new(1.0, 0.1).unwrap().at(here).with_lag(1.0), state) < 1e-8);
+        assert!(jacobian_error(&RangeBearing::new(1.0, 0.1).unwrap().at(here), state) < 1e-8);
+        assert!(jacobian_error(&BearingOnly::new(0.1).unwrap().at(here), state) < 1e-8);
+        let doppler = RangeBearingRate::new(1.0, 0.1, 0.5).unwrap().at(here, vector![5.0, 1.0]);
+        assert!(jacobian_error(&doppler, state) < 1e-8);
+    }
+}
+
+#[test]
+fn bearings_differ_by_less_than_half_a_turn() {
+    let radar = RangeBearing::new(1.0, 0.1).unwrap();
+    let difference = Sensor::<4, 2>::difference(&radar, &vector![0.0, 3.1], &vector![0.0, -3.1]);
+    assert!((difference[1] - (6.2 - TAU)).abs() < 1e-12);
+    for angle in [-1e9, -7.0, -PI, 0.0, PI, 3.2, 1e9] {
+        assert!(wrapped(angle).abs() <= PI);
+        assert!(((wrapped(angle) - angle) / TAU - ((wrapped(angle) - angle) / TAU).round()).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_birth_is_where_the_measurement_says() {
+    let prior: Gaussian<4> = ConstantVelocity::new(1.0).with_speed(20.0).prior();
+    let here = vector![100.0, -50.0];
+    let object = vector![400.0, 350.0, 3.0, 4.0];
+    let polar = RangeBearing::new(2.0, 0.01).unwrap().at(here);
+    let seen = polar.expected(&object);
+    let born = polar.birth(&seen.into(), &prior).unwrap();
+    assert!((born.mean - vector![400.0, 350.0, 0.0, 0.0]).amax() < 1e-9);
+    assert_eq!(born.covariance[(2, 2)], 400.0);
+    let converted = ConvertedPolar::new(2.0, 0.01).unwrap().at(here);
+    let born = converted.birth(&seen.into(), &prior).unwrap();
+    assert!((born.mean - vector![400.0, 350.0, 0.0, 0.0]).amax() < 0.05);
+    let blind = BearingOnly::new(0.01).unwrap().birth(&[0.3].into(), &prior);
+    assert!(matches!(blind, Err(FilterError::NotInvertible { .. })));
+    let not_finite = polar.birth(&[f64::NAN, 0.0].into(), &prior);
+    assert_eq!(not_finite, Err(FilterError::NotFinite { what: "measurement" }));
+}
+
+#[test]
+fn a_lag_couples_the_born_position_to_its_velocity() {
+    let prior: Gaussian<4> = ConstantVelocity::new(1.0).with_speed(10.0).prior();
+    let radar = Position::new(2.0).unwrap().with_lag(1.5);
+    let born = radar.birth(&[0.0, 0.0].into(), &prior).unwrap();
+    assert!((born.covariance[(0, 0)] - (4.0 + 2.25 * 100.0)).abs() < 1e-9);
+    assert!((born.covariance[(0, 2)] - 150.0).abs() < 1e-9);
+    // Whatever the velocity, the birth explains its measurement: the innovation covariance is 2 R.
+    let h = radar.jacobian(&born.mean);
+    let explained = h * born.covariance * h.transpose();
+    assert!((explained - Matrix2x2::identity() * 4.0).amax() < 1e-9);
+}
+
+type Matrix2x2 = SMatrix<f64, 2, 2>;
+
+#[test]
+fn doppler_says_something_of_the_velocity() {
+    let prior: Gaussian<4> = ConstantVelocity::new(1.0).with_speed(30.0).prior();
+    let radar = RangeBearingRate::new(5.0, 0.001, 0.5).unwrap();
+    let born = radar.birth(&[1000.0, 0.0, -12.0].into(), &prior).unwrap();
+    assert!((born.mean[2] + 12.0).abs() < 0.1);
+    assert!(born.covariance[(2, 2)].sqrt() < 0.6 && born.covariance[(3, 3)].sqrt() > 29.0);
+}
+
+/// Mean and covariance of the conversion error over many draws, for a radar with a bearing error of 5 degrees.
+fn conversion_error(radar: &ConvertedPolar) -> (Vector2<f64>, Matrix2x2, Matrix2x2) {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    let (range, bearing, deviation) = (10_000.0, 0.7, vector![50.0, 5.0f64.to_radians()]);
+    let truth = range_bearing::cartesian(range, bearing);
+    let mut generator = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let draws = 40_000;
+    let (mut mean, mut square, mut stated) = (Vector2::zeros(), Matrix2x2::zeros(), Matrix2x2::zeros());
+    for _ in 0..draws {
+        let [a, b]: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut generator));
+        let measured = vector![range + a * deviation[0], bearing + b * deviation[1]];
+        let reading = Sensor::<4, 2>::read(radar, &measured.into());
+        let error = reading.value - truth;
+        mean += error / draws as f64;
+        square += error * error.transpose() / draws as f64;
+        stated += reading.noise / draws as f64;
+    }
+    (mean, square, stated)
+}
+
+#[test]
+fn debiasing_removes_the_mean_error_and_states_the_right_covariance() {
+    let radar = ConvertedPolar::new(50.0, 5.0f64.to_radians()).unwrap();
+    let (mean, covariance, stated) = conversion_error(&radar);
+    let (biased_mean, ..) = conversion_error(&radar.biased());
+    assert!(biased_mean.norm() > 30.0, "{biased_mean}");
+    assert!(mean.norm() < 10.0, "{mean}");
+    assert!((covariance - stated).norm() / covariance.norm() < 0.03, "{covariance} {stated}");
+}
