@@ -1,1 +1,5 @@
 //! association
+
+mod assignment;
+
+pub use assignment::{Assignment, AssignmentError, AssignmentSolver};
