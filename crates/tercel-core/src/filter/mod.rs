@@ -115,7 +115,7 @@ pub trait Filter<const N: usize> {
     fn area(&self, measurement: &Self::Measurement) -> f64;
 
     /// Moves many beliefs forward. Filters that work faster on batches override it.
-    fn predict_all(&self, beliefs: &mut [Self::Belief], dt: f64) {
+    fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
         for belief in beliefs {
             self.predict(belief, dt);
         }
@@ -172,7 +172,7 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
     fn area(&self, measurement: &Self::Measurement) -> f64 {
         (**self).area(measurement)
     }
-    fn predict_all(&self, beliefs: &mut [Self::Belief], dt: f64) {
+    fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
         (**self).predict_all(beliefs, dt);
     }
 }
