@@ -57,10 +57,12 @@ impl FilterConfig {
                 "filter.estimator",
                 "coordinated_turn is not linear; use \"extended\", \"unscented\" or \"particle\"",
             )),
-            (Estimator::Particle, _) if matches!(motion, MotionConfig::Switching(_)) => Err(PipelineError::config(
-                "filter.estimator",
-                "a particle filter with switching motion is not available; use \"extended\" or \"unscented\"",
-            )),
+            (Estimator::Particle, _) if matches!(motion, MotionConfig::Switching(_)) => {
+                Err(PipelineError::config(
+                    "filter.estimator",
+                    "a particle filter with switching motion is not available; use \"extended\" or \"unscented\"",
+                ))
+            }
             (Estimator::Particle, _) => Ok(()),
             _ if self.particles.is_some() => {
                 Err(PipelineError::config("filter.particles", "needs filter.estimator = \"particle\""))

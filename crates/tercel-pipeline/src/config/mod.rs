@@ -18,8 +18,13 @@ use crate::PipelineError;
 pub use filter::{Estimator, FilterConfig};
 pub use motion::{AccelerationModel, MotionConfig, Singer, Switching, TurnModel};
 pub use number::{Count, NonNegative, Positive, Probability};
-pub use sensor::{Bearing, ClutterConfig, DetectionConfig, MapClutter, Measures, Polar, PositionSensor, SensorConfig, UniformClutter};
-pub use tracker::{ConfirmConfig, HitsConfig, ManagementConfig, NearestNeighbourConfig, PhdConfig, TrackerConfig};
+pub use sensor::{
+    Bearing, ClutterConfig, DetectionConfig, MapClutter, Measures, Polar, PositionSensor, SensorConfig,
+    UniformClutter,
+};
+pub use tracker::{
+    ConfirmConfig, HitsConfig, ManagementConfig, NearestNeighbourConfig, PhdConfig, TrackerConfig,
+};
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -72,8 +77,7 @@ impl Config {
     /// When the text is not TOML, a key is unknown or missing, or a value lies outside its range. The message points at the
     /// line and the column.
     pub fn parse(text: &str) -> Result<Self, PipelineError> {
-        let config: Config =
-            toml::from_str(text).map_err(|error| PipelineError::Syntax(Box::new(error)))?;
+        let config: Config = toml::from_str(text).map_err(|error| PipelineError::Syntax(Box::new(error)))?;
         config.check()?;
         Ok(config)
     }
@@ -92,7 +96,10 @@ impl Config {
     /// Checks what no single key can say: that the parts fit together.
     fn check(&self) -> Result<(), PipelineError> {
         if self.sensors.is_empty() {
-            return Err(PipelineError::config("sensors", "there is no sensor; add a section such as [sensors.radar]"));
+            return Err(PipelineError::config(
+                "sensors",
+                "there is no sensor; add a section such as [sensors.radar]",
+            ));
         }
         self.motion.check("motion")?;
         for (name, sensor) in &self.sensors {

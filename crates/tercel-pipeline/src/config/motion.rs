@@ -149,9 +149,12 @@ impl MotionConfig {
             MotionConfig::ConstantAcceleration { .. } | MotionConfig::Singer(_) => {
                 &["x", "y", "vx", "vy", "ax", "ay"]
             }
-            MotionConfig::Switching(switching) => {
-                switching.modes.iter().map(MotionConfig::labels).max_by_key(|labels| labels.len()).unwrap_or(&[])
-            }
+            MotionConfig::Switching(switching) => switching
+                .modes
+                .iter()
+                .map(MotionConfig::labels)
+                .max_by_key(|labels| labels.len())
+                .unwrap_or(&[]),
         }
     }
 
