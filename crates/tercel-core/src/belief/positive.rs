@@ -168,6 +168,12 @@ pub(crate) fn settle<const N: usize>(
     }
 }
 
+/// Whether the lower triangle of `matrix` is that of a positive definite one.
+#[inline]
+pub(crate) fn is_definite<const N: usize>(matrix: &SMatrix<f64, N, N>) -> bool {
+    Cholesky::new(matrix, "").is_ok()
+}
+
 /// Replaces both triangles by their mean.
 #[inline]
 pub(crate) fn symmetrise<const N: usize>(matrix: &mut SMatrix<f64, N, N>) {
