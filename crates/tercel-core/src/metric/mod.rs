@@ -23,6 +23,7 @@ mod ospa2;
 mod rmse;
 mod scale;
 mod trajectory;
+mod trajectory_gospa;
 
 pub use consistency::{Consistency, chi_square_quantile, nees};
 pub use gospa::{Gospa, GospaAverage, GospaParts, GospaScore};
@@ -30,3 +31,4 @@ pub use ospa::{Ospa, OspaParts, OspaScore};
 pub use ospa2::Ospa2;
 pub use rmse::Rmse;
 pub use trajectory::Trajectory;
+pub use trajectory_gospa::{TrajectoryGospa, TrajectoryGospaParts, TrajectoryGospaScore};
