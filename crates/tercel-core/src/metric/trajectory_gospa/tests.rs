@@ -1,0 +1,214 @@
+use std::ops::Range;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::metric::Gospa;
+
+type Track = Trajectory<2>;
+
+fn line(y: f64, steps: Range<usize>) -> Track {
+    Trajectory::new(steps.start, steps.map(move |t| [t as f64, y]))
+}
+
+fn metric(cutoff: f64, order: f64, switch: f64) -> TrajectoryGospa {
+    TrajectoryGospa::new(cutoff, order, switch).unwrap()
+}
+
+/// The minimum over all sequences of assignments, by dynamic programming over every assignment of a step: the
+/// multi-dimensional assignment metric, to the power `p`.
+fn by_enumeration(metric: &TrajectoryGospa, truth: &[Track], tracks: &[Track], steps: usize) -> f64 {
+    let states = assignments(truth.len(), tracks.len());
+    let half = 0.5 * metric.scale.highest();
+    let change = 0.5 * metric.scale.power(metric.switch);
+    let mut values = vec![0.0; states.len()];
+    for step in 0..steps {
+        let at = |state: &Vec<Option<usize>>| {
+            let mut cost = half
+                * truth.iter().chain(tracks).filter(|trajectory| trajectory.at(step).is_some()).count()
+                    as f64;
+            for (i, j) in state.iter().enumerate().filter_map(|(i, j)| Some((i, (*j)?))) {
+                if let (Some(x), Some(y)) = (truth[i].at(step), tracks[j].at(step)) {
+                    let distance = f64::hypot(x[0] - y[0], x[1] - y[1]).min(metric.scale.cutoff);
+                    cost += metric.scale.power(distance) - 2.0 * half;
+                }
+            }
+            cost
+        };
+        let moved = |to: &Vec<Option<usize>>| {
+            let from = states.iter().zip(&values).map(|(from, value)| value + change * changes(from, to));
+            from.fold(f64::INFINITY, f64::min)
+        };
+        values = states
+            .iter()
+            .enumerate()
+            .map(|(k, state)| at(state) + if step == 0 { values[k] } else { moved(state) })
+            .collect();
+    }
+    values.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+fn changes(from: &[Option<usize>], to: &[Option<usize>]) -> f64 {
+    let pairs = from.iter().zip(to).filter(|(a, b)| a != b);
+    pairs.map(|(a, b)| f64::from(u8::from(a.is_some()) + u8::from(b.is_some()))).sum()
+}
+
+fn assignments(rows: usize, columns: usize) -> Vec<Vec<Option<usize>>> {
+    let mut all = vec![Vec::new()];
+    for _ in 0..rows {
+        let mut longer = Vec::new();
+        for one in &all {
+            for choice in std::iter::once(None).chain((0..columns).map(Some)) {
+                if choice.is_none() || !one.contains(&choice) {
+                    longer.push(one.iter().copied().chain([choice]).collect());
+                }
+            }
+        }
+        all = longer;
+    }
+    all
+}
+
+/// Up to `most` trajectories of `steps` steps on a coarse grid, with gaps, so that ties are common.
+fn set(most: usize, steps: usize) -> impl Strategy<Value = Vec<Track>> {
+    let point = prop_oneof![
+        1 => Just(None),
+        4 => (0i32..8, 0i32..3).prop_map(|(x, y)| Some([f64::from(x), f64::from(y)])),
+        4 => (0.0..8.0, 0.0..3.0f64).prop_map(|(x, y)| Some([x, y])),
+    ];
+    let track = (0..steps, prop::collection::vec(point, 0..steps)).prop_map(move |(start, mut positions)| {
+        positions.truncate(steps - start);
+        Trajectory { start, positions }
+    });
+    prop::collection::vec(track, 0..=most)
+}
+
+fn setting() -> impl Strategy<Value = TrajectoryGospa> {
+    (2.0..8.0, prop_oneof![Just(1.0), Just(2.0), 1.0..3.0], 0.1..6.0).prop_map(|(c, p, g)| metric(c, p, g))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn the_minimum_is_at_most_that_over_all_assignments_and_equal_when_weights_are_whole(
+        metric in setting(), truth in set(3, 6), tracks in set(3, 6),
+    ) {
+        let score = metric.score(&truth, &tracks).unwrap();
+        let whole = by_enumeration(&metric, &truth, &tracks, 6);
+        let sum = score.parts.sum();
+        prop_assert!(score.gap <= 1e-9 * metric.scale.highest(), "gap {}", score.gap);
+        prop_assert!(sum <= whole + 1e-7, "{} above {}", sum, whole);
+        if score.pairs.iter().all(|pair| pair.2.fract() == 0.0) {
+            prop_assert!((sum - whole).abs() < 1e-7, "{} instead of {}", sum, whole);
+        }
+    }
+
+    #[test]
+    fn two_sets_are_as_far_apart_as_one_and_the_other(metric in setting(), a in set(4, 7), b in set(4, 7)) {
+        let (there, back) = (metric.score(&a, &b).unwrap(), metric.score(&b, &a).unwrap());
+        prop_assert!((there.parts.sum() - back.parts.sum()).abs() < 1e-7);
+        prop_assert!(metric.score(&a, &a).unwrap().total == 0.0);
+    }
+
+    #[test]
+    fn a_way_round_is_not_shorter(
+        metric in setting(), a in set(3, 6), b in set(3, 6), c in set(3, 6),
+    ) {
+        let distance = |x: &[Track], y: &[Track]| metric.score(x, y).unwrap().total;
+        prop_assert!(distance(&a, &c) <= distance(&a, &b) + distance(&b, &c) + 1e-7);
+    }
+
+    #[test]
+    fn one_step_is_gospa(
+        metric in setting(),
+        truth in prop::collection::vec(prop::array::uniform2(0.0..10.0f64), 0..8),
+        tracks in prop::collection::vec(prop::array::uniform2(0.0..10.0f64), 0..8),
+    ) {
+        let points = |set: &[[f64; 2]]| -> Vec<Track> { set.iter().map(|x| Trajectory::new(5, [*x])).collect() };
+        let score = metric.score(&points(&truth), &points(&tracks)).unwrap();
+        let gospa = Gospa::new(metric.scale.cutoff, metric.scale.order).unwrap().score(&truth, &tracks).unwrap();
+        prop_assert!((score.total - gospa.total).abs() < 1e-9);
+        prop_assert!((score.parts.missed - gospa.parts.missed).abs() < 1e-9);
+        prop_assert!((score.parts.false_alarm - gospa.parts.false_alarm).abs() < 1e-9);
+        prop_assert_eq!(score.switches, 0.0);
+    }
+
+    #[test]
+    fn the_order_of_trajectories_and_the_origin_do_not_matter(
+        metric in setting(), truth in set(4, 6), tracks in set(4, 6), shift in -50.0..50.0f64, turn in -3.0..3.0f64,
+    ) {
+        let moved = |set: &[Track]| -> Vec<Track> {
+            let place = |x: &[f64; 2]| [
+                turn.cos() * x[0] - turn.sin() * x[1] + shift, turn.sin() * x[0] + turn.cos() * x[1] - shift,
+            ];
+            let one = |track: &Track| Trajectory {
+                start: track.start + 3,
+                positions: track.positions.iter().map(|x| x.as_ref().map(place)).collect(),
+            };
+            set.iter().rev().map(one).collect()
+        };
+        let (here, there) = (metric.score(&truth, &tracks).unwrap(), metric.score(&moved(&truth), &moved(&tracks)).unwrap());
+        prop_assert!((here.parts.sum() - there.parts.sum()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn parts_of_steps_sum_to_the_total_and_none_is_negative(
+        metric in setting(), truth in set(5, 8), tracks in set(5, 8),
+    ) {
+        let score = metric.score(&truth, &tracks).unwrap();
+        prop_assert!((metric.scale.power(score.total) - score.parts.sum()).abs() < 1e-7);
+        for step in &score.steps {
+            prop_assert!(step.localisation > -1e-9 && step.missed > -1e-9);
+            prop_assert!(step.false_alarm > -1e-9 && step.switches >= 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_swap_of_two_tracks_is_two_switches() {
+    let truth = [line(0.0, 0..20), line(30.0, 0..20)];
+    let cross = |from: f64, to: f64| {
+        Trajectory::new(0, (0..20).map(move |t| [t as f64, if t < 12 { from } else { to }]))
+    };
+    let score = metric(10.0, 1.0, 3.0).score(&truth, &[cross(0.0, 30.0), cross(30.0, 0.0)]).unwrap();
+    assert_eq!((score.switches, score.total), (2.0, 6.0));
+    assert_eq!(score.steps[12].switches, 6.0);
+    assert_eq!(score.pairs, [(0, 0, 12.0), (0, 1, 8.0), (1, 0, 8.0), (1, 1, 12.0)]);
+}
+
+#[test]
+fn a_track_that_passes_from_one_object_to_another_is_one_switch() {
+    // Half a switch for the object that loses it and half for the one that gets it.
+    let truth = [line(0.0, 0..10), line(30.0, 10..20)];
+    let track = Trajectory::new(0, (0..20).map(|t| [t as f64, if t < 10 { 0.0 } else { 30.0 }]));
+    let score = metric(10.0, 1.0, 3.0).score(&truth, &[track]).unwrap();
+    assert_eq!((score.switches, score.total), (1.0, 3.0));
+}
+
+#[test]
+fn a_switch_that_costs_more_than_it_gains_is_not_made() {
+    let truth = [line(0.0, 0..10)];
+    let tracks = [line(1.0, 0..10), line(0.0, 5..7)];
+    let score = metric(10.0, 1.0, 3.0).score(&truth, &tracks).unwrap();
+    assert_eq!((score.switches, score.parts.localisation, score.parts.false_alarm), (0.0, 10.0, 10.0));
+}
+
+#[test]
+fn nothing_against_nothing_is_zero_and_against_something_its_price() {
+    let metric = metric(10.0, 2.0, 3.0);
+    assert_eq!(metric.score::<2>(&[], &[]).unwrap().total, 0.0);
+    let missed = metric.score(&[line(0.0, 4..8)], &[]).unwrap();
+    assert_eq!((missed.parts.missed, missed.start, missed.steps.len()), (200.0, 4, 4));
+    assert_eq!(missed.total, 200f64.sqrt());
+}
+
+#[test]
+fn positions_and_parameters_out_of_range_are_refused() {
+    assert!(TrajectoryGospa::new(10.0, 1.0, 0.0).is_err());
+    assert!(TrajectoryGospa::new(10.0, 0.5, 1.0).is_err());
+    assert!(TrajectoryGospa::new(f64::NAN, 1.0, 1.0).is_err());
+    assert!(metric(1e200, 2.0, 1.0).score::<2>(&[], &[]).is_err());
+    let bad = Trajectory::new(0, [[f64::NAN, 0.0]]);
+    assert!(metric(10.0, 1.0, 1.0).score(&[bad], &[]).is_err());
+}
