@@ -112,3 +112,15 @@ function layoutStyle(colours) {
     separators: ". ",
   };
 }
+
+/** Draws a plot again in the size that its host has, or in another width. */
+function fitPlot(plot, width = plot.clientWidth) {
+  const height = plot.clientHeight;
+  const { width: oldWidth, height: oldHeight } = plot._fullLayout;
+  if (width > 0 && height > 0 && (width !== oldWidth || height !== oldHeight)) Plotly.relayout(plot, { width, height });
+}
+
+/** Keeps a plot as large as its host. Plotly's own way waits a tenth of a second, and does not see every change. */
+function followSize(plot) {
+  new ResizeObserver(() => fitPlot(plot)).observe(plot);
+}

@@ -16,7 +16,6 @@ function createChart(host, chart, moveTo) {
 
   const layout = () => chartLayout(colours, chart, (chart.parts.length === 1 ? chart.parts[0].name : chart.title) + unit);
   Plotly.newPlot(plot, chartTraces(chart, colours), layout(), {
-    responsive: true,
     displaylogo: false,
     displayModeBar: false,
     doubleClick: "autosize",
@@ -31,6 +30,7 @@ function createChart(host, chart, moveTo) {
     line.style.height = `${size.h}px`;
   }
 
+  followSize(plot);
   plot.on("plotly_afterplot", place);
   if (moveTo) {
     plot.classList.add("clickable");
@@ -45,9 +45,7 @@ function createChart(host, chart, moveTo) {
       colours = readColours();
       Plotly.react(plot, chartTraces(chart, colours), layout());
     },
-    fit(width) {
-      Plotly.relayout(plot, width ? { width } : { width: null, autosize: true });
-    },
+    fit: (width) => fitPlot(plot, width),
   };
 }
 

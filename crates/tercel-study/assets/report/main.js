@@ -36,7 +36,7 @@ function ownsKey(target, key) {
 function fitPrint(parts) {
   const paper = 700;
   addEventListener("beforeprint", () => parts.forEach((part) => part.fit(paper)));
-  addEventListener("afterprint", () => parts.forEach((part) => part.fit(null)));
+  addEventListener("afterprint", () => parts.forEach((part) => part.fit()));
 }
 
 start();

@@ -72,9 +72,8 @@ function unpackTrack(track, index, users) {
   track.detection.forEach((id) => {
     if (id !== null) users.set(id, track.id);
   });
-  const ended = track.status[last] === "D";
-  const believed = /[CK]/.test(track.status);
-  return { ...track, index, first: track.t[0], last: track.t[last], ended, believed };
+  const until = track.until === null ? Infinity : track.until;
+  return { ...track, index, first: track.t[0], last: track.t[last], until, believed: /[CK]/.test(track.status) };
 }
 
 function boundsOf(model) {
@@ -119,7 +118,7 @@ function leadTime(model) {
 /** The row of a track at a time, or -1 when the track does not live then. */
 function rowAt(track, time) {
   const row = lastAtMost(track.t, time);
-  if (row < 0 || time > track.last || track.status[row] === "D") return -1;
+  if (row < 0 || time >= track.until || track.status[row] === "D") return -1;
   return track.x[row] === null || track.y[row] === null ? -1 : row;
 }
 

@@ -219,7 +219,7 @@ function paintNow(context, track, row, model, view, scale, colours, chosen) {
     context.stroke();
   }
   context.beginPath();
-  context.arc(x, y, chosen ? 6.5 : 4.5, 0, 2 * Math.PI);
+  context.arc(x, y, chosen ? 5.5 : 4, 0, 2 * Math.PI);
   // A track that was missed in this scan is hollow.
   if (track.status[row] === "K") context.fillStyle = colours.paper;
   context.fill();

@@ -38,7 +38,7 @@ function createPicture(section, data) {
   const visit = (id) => {
     view.chosen = id;
     const track = model.trackById.get(id);
-    if (view.time < track.first || view.time > track.last) player.moveTo(track.last);
+    if (view.time < track.first || view.time >= track.until) player.moveTo(track.last);
     table.markChosen();
     showTrack(plan, model, track);
   };
@@ -210,10 +210,10 @@ function createLayers(host, model, view, changed) {
   };
   const tentative = model.tracks.filter((track) => !track.believed).length;
   model.sensors.forEach((sensor, i) => {
-    add(i, `${sensor.name}: ${numeral(sensor.count, 0)} detections`, sensorSwatch(i), view.detections);
+    add(i, `${sensor.name}: ${numeral(sensor.count, 0)}`, sensorSwatch(i), view.detections);
   });
   add("tracks", `Tracks: ${model.tracks.length - tentative}`, lineSwatch("--track-0", "solid"));
-  add("tentative", `Tentative tracks: ${tentative} never confirmed`, lineSwatch("--tentative", "solid"));
+  add("tentative", `Tentative: ${tentative}`, lineSwatch("--tentative", "solid"));
   if (model.truths.length) add("truth", `Truth: ${model.truths.length}`, lineSwatch("--truth", "dashed"));
   add("trails", "Trails", "");
   add("ellipses", "2σ ellipses", "");

@@ -11,7 +11,6 @@ function createPlan(host, model, view, choose) {
   let waiting = false;
 
   Plotly.newPlot(frame, [boundsTrace(model.bounds)], planLayout(colours), {
-    responsive: true,
     scrollZoom: true,
     displaylogo: false,
     displayModeBar: true,
@@ -27,13 +26,10 @@ function createPlan(host, model, view, choose) {
     waiting = false;
     const scale = planScale(frame);
     const density = Math.max(2, window.devicePixelRatio || 1);
-    const width = Math.round(frame.clientWidth * density);
-    const height = Math.round(frame.clientHeight * density);
-    if (canvas.width !== width) canvas.width = width;
-    if (canvas.height !== height) canvas.height = height;
+    resizeCanvas(canvas, frame._fullLayout.width, frame._fullLayout.height, density);
     const context = canvas.getContext("2d");
     context.setTransform(density, 0, 0, density, 0, 0);
-    context.clearRect(0, 0, frame.clientWidth, frame.clientHeight);
+    context.clearRect(0, 0, canvas.width, canvas.height);
     context.save();
     context.beginPath();
     context.rect(scale.left, scale.top, scale.width, scale.height);
@@ -53,6 +49,7 @@ function createPlan(host, model, view, choose) {
 
   frame.on("plotly_relayouting", schedule);
   frame.on("plotly_afterplot", schedule);
+  followSize(frame);
   watchPointer(host, frame, { model, view, ring, tip, choose });
   paint();
 
@@ -72,11 +69,19 @@ function createPlan(host, model, view, choose) {
       Plotly.relayout(frame, { "xaxis.range": [x - across, x + across], "yaxis.range": [y - up, y + up] });
     },
     fit(width) {
-      const size = width ? { width, height: frame.clientHeight } : { width: null, height: null, autosize: true };
-      Plotly.relayout(frame, size);
+      fitPlot(frame, width);
       paint();
     },
   };
+}
+
+/** Gives the canvas the size of the frame, with `density` pixels for each of the style sheet's. */
+function resizeCanvas(canvas, width, height, density) {
+  canvas.style.width = `${width}px`;
+  canvas.style.height = `${height}px`;
+  const [across, down] = [Math.round(width * density), Math.round(height * density)];
+  if (canvas.width !== across) canvas.width = across;
+  if (canvas.height !== down) canvas.height = down;
 }
 
 /** An invisible trace that tells plotly how large the picture is. */

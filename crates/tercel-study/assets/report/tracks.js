@@ -2,9 +2,9 @@
 
 const TRACK_COLUMNS = [
   { name: "Track", value: (track) => track.id, text: (track) => String(track.id) },
-  { name: "First, s", value: (track) => track.first, text: (track) => numeral(track.first, 1) },
-  { name: "Last, s", value: (track) => track.last, text: (track) => numeral(track.last, 1) },
-  { name: "Duration, s", value: (track) => track.last - track.first, text: (track) => numeral(track.last - track.first, 1) },
+  { name: "First,\u00a0s", value: (track) => track.first, text: (track) => numeral(track.first, 1) },
+  { name: "Last,\u00a0s", value: (track) => track.last, text: (track) => numeral(track.last, 1) },
+  { name: "Duration,\u00a0s", value: (track) => track.last - track.first, text: (track) => numeral(track.last - track.first, 1) },
   { name: "Updates", value: (track) => track.updates, text: (track) => numeral(track.updates, 0) },
   { name: "Max existence", value: (track) => track.peak, text: (track) => numeral(track.peak, 3) },
 ];

@@ -3,7 +3,7 @@
 mod plots;
 mod tracks;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use tercel_data::table::{Detections, Status, Tracks, Truth, Truths};
@@ -91,7 +91,9 @@ impl Picture {
         let start = times.first().copied().unwrap_or(0.0);
         let mut notes = Vec::new();
         let plots = Plots::of(detections, sensors, start, DRAWN_DETECTIONS, &mut notes);
-        let columns = columns_of_tracks(tracks, start, DRAWN_TRACK_ROWS, &mut notes)?;
+        let reports = report_times(detections, tracks);
+        let columns = columns_of_tracks(tracks, start, &reports, DRAWN_TRACK_ROWS, &mut notes)?;
+        let counted = if reports.is_empty() { &times } else { &reports };
         Ok(Picture {
             start,
             times: times.iter().map(|time| Number::milli(time - start)).collect(),
@@ -101,7 +103,7 @@ impl Picture {
             truths: truths.map_or_else(Vec::new, |truths| columns_of_truths(truths, start)),
             notes,
             charts: Vec::new(),
-            counts: (!times.is_empty()).then(|| count_chart(&times, tracks, truths)),
+            counts: (!times.is_empty()).then(|| count_chart(counted, tracks, truths)),
         })
     }
 
@@ -129,13 +131,24 @@ impl Picture {
 /// The times at which the slider stops: those of scans and tracks; those of the truth if there is nothing else.
 fn slider_times(detections: &Detections, tracks: &Tracks, truths: Option<&Truths>) -> Vec<f64> {
     let scans = detections.scans.iter().map(|scan| scan.time);
-    let mut times: Vec<f64> = scans.chain(tracks.rows.iter().map(|row| row.time)).collect();
-    times.retain(|time| time.is_finite());
-    if times.is_empty() {
-        times.extend(
-            truths.iter().flat_map(|truths| &truths.rows).map(|row| row.time).filter(|t| t.is_finite()),
-        );
+    let times = sorted_times(scans.chain(tracks.rows.iter().map(|row| row.time)));
+    if !times.is_empty() {
+        return times;
     }
+    sorted_times(truths.iter().flat_map(|truths| &truths.rows).map(|row| row.time))
+}
+
+/// The times at which a tracker told its tracks: those of the scans of sensors that it reported on, so that a scan
+/// without any track counts as one.
+fn report_times(detections: &Detections, tracks: &Tracks) -> Vec<f64> {
+    let sensors: BTreeSet<&str> = tracks.rows.iter().map(|row| &*row.sensor).collect();
+    let scans = detections.scans.iter().filter(|scan| sensors.contains(&*scan.sensor)).map(|scan| scan.time);
+    sorted_times(scans.chain(tracks.rows.iter().map(|row| row.time)))
+}
+
+/// Finite times in ascending order, each once.
+fn sorted_times(times: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut times: Vec<f64> = times.filter(|time| time.is_finite()).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
     times

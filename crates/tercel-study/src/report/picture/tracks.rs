@@ -12,6 +12,8 @@ use crate::report::number::{Id, Number};
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct TrackColumns {
     id: Id,
+    /// Time of the first report without the track; missing when it is there to the end.
+    until: Number,
     /// Rows of the table that a detection updated, before any thinning.
     updates: usize,
     /// Highest probability of existence, before any thinning.
@@ -39,10 +41,11 @@ pub(super) struct TrackColumns {
     detection: Vec<Option<Id>>,
 }
 
-/// Splits the table into tracks, in the order of their numbers.
+/// Splits the table into tracks, in the order of their numbers. `reports` are the times at which tracks were told.
 pub(super) fn columns_of_tracks(
     tracks: &Tracks,
     start: f64,
+    reports: &[f64],
     limit: usize,
     remarks: &mut Vec<String>,
 ) -> Result<Vec<TrackColumns>, ReportError> {
@@ -59,35 +62,39 @@ pub(super) fn columns_of_tracks(
     if stride > 1 {
         remarks.push(format!("One in {stride} of {rows} rows of tracks is drawn."));
     }
-    lives
-        .into_iter()
-        .map(|(id, life)| columns(id, life, &layout, tracks.modes.len(), start, stride))
-        .collect()
+    let frame = Frame { layout, modes: tracks.modes.len(), start, reports, stride };
+    lives.into_iter().map(|(id, life)| columns(id, life, &frame)).collect()
 }
 
-fn columns(
-    id: u64,
-    mut life: Vec<&Track>,
-    layout: &Layout,
+/// What all tracks of a table share.
+struct Frame<'a> {
+    layout: Layout,
     modes: usize,
     start: f64,
+    reports: &'a [f64],
     stride: usize,
-) -> Result<TrackColumns, ReportError> {
+}
+
+fn columns(id: u64, mut life: Vec<&Track>, frame: &Frame<'_>) -> Result<TrackColumns, ReportError> {
+    let (layout, start) = (&frame.layout, frame.start);
     life.sort_by(|a, b| a.time.total_cmp(&b.time));
     for row in &life {
         layout.check(row)?;
     }
     let updates = life.iter().filter(|row| row.detection.is_some()).count();
     let peak = life.iter().map(|row| row.existence).fold(f64::NAN, f64::max);
-    let rows = thinned(&life, stride);
+    let rows = thinned(&life, frame.stride);
     let column = |value: &dyn Fn(&Track) -> Number| rows.iter().map(|row| value(row)).collect::<Vec<_>>();
     let ellipses: Vec<Option<[f64; 3]>> = rows.iter().map(|row| layout.ellipse(row)).collect();
     let axis = |i: usize| ellipses.iter().map(|e| Number::optional(e.map(|e| e[i]))).collect();
     let velocity = |i: Option<usize>| i.map_or(Vec::new(), |i| column(&|row| Number::milli(row.state[i])));
     let extended = rows.iter().any(|row| row.extent.is_some());
     let mode = |i: usize| column(&|row| row.modes.get(i).map_or(Number::MISSING, |&p| Number::milli(p)));
+    let last = life.last().map_or(f64::NAN, |row| row.time);
+    let until = frame.reports.get(frame.reports.partition_point(|&time| time <= last)).copied();
     Ok(TrackColumns {
         id: Id(id),
+        until: Number::optional(until.map(|until| until - start)),
         updates,
         peak: Number::milli(peak),
         status: rows.iter().map(|row| letter(row.status)).collect(),
@@ -104,7 +111,7 @@ fn columns(
             true => rows.iter().map(|row| row.extent.map(|extent| extent.map(Number::milli))).collect(),
             false => Vec::new(),
         },
-        modes: (0..modes).map(mode).collect(),
+        modes: (0..frame.modes).map(mode).collect(),
         detection: rows.iter().map(|row| row.detection.map(Id)).collect(),
     })
 }
@@ -198,10 +205,21 @@ mod tests {
     #[test]
     fn the_ellipse_has_two_standard_deviations_along_its_axes() {
         let columns =
-            columns_of_tracks(&table(vec![row(0.0, Status::Confirmed)]), 0.0, 9, &mut vec![]).unwrap();
+            columns_of_tracks(&table(vec![row(0.0, Status::Confirmed)]), 0.0, &[], 9, &mut vec![]).unwrap();
         let json = serde_json::to_value(&columns[0]).unwrap();
         assert_eq!((&json["major"], &json["minor"]), (&serde_json::json!([6]), &serde_json::json!([4])));
         assert_eq!(json["angle"], serde_json::json!([1.571]));
+    }
+
+    #[test]
+    fn a_track_stands_until_the_first_report_without_it() {
+        let rows = table(vec![row(0.0, Status::Confirmed), row(2.0, Status::Confirmed)]);
+        let until = |reports: &[f64]| {
+            let columns = columns_of_tracks(&rows, 0.0, reports, 9, &mut vec![]).unwrap();
+            serde_json::to_value(&columns[0]).unwrap()["until"].clone()
+        };
+        assert_eq!(until(&[0.0, 2.0, 4.5, 6.0]), serde_json::json!(4.5));
+        assert_eq!(until(&[0.0, 2.0]), serde_json::json!(null));
     }
 
     #[test]
@@ -229,7 +247,7 @@ mod tests {
         let status = |k| if k < 5 { Status::Tentative } else { Status::Confirmed };
         let rows: Vec<Track> = (0..100).map(|k| row(k as f64, status(k))).collect();
         let mut remarks = Vec::new();
-        let columns = columns_of_tracks(&table(rows), 0.0, 10, &mut remarks).unwrap();
+        let columns = columns_of_tracks(&table(rows), 0.0, &[], 10, &mut remarks).unwrap();
         let json = serde_json::to_value(&columns[0]).unwrap();
         assert_eq!(json["t"], serde_json::json!([0, 4, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90, 99]));
         assert_eq!((&json["updates"], remarks.len()), (&serde_json::json!(100), 1));
@@ -239,7 +257,7 @@ mod tests {
     fn a_table_without_positions_is_an_error_that_names_its_components() {
         let mut tracks = table(vec![row(0.0, Status::Confirmed)]);
         tracks.labels[1] = "height".into();
-        let message = columns_of_tracks(&tracks, 0.0, 9, &mut vec![]).unwrap_err().to_string();
+        let message = columns_of_tracks(&tracks, 0.0, &[], 9, &mut vec![]).unwrap_err().to_string();
         assert!(message.contains("`y`") && message.contains("height"), "{message}");
     }
 
@@ -247,7 +265,8 @@ mod tests {
     fn a_state_that_does_not_fit_the_labels_is_an_error_that_names_the_row() {
         let mut short = row(12.5, Status::Confirmed);
         short.state.pop();
-        let message = columns_of_tracks(&table(vec![short]), 0.0, 9, &mut vec![]).unwrap_err().to_string();
+        let message =
+            columns_of_tracks(&table(vec![short]), 0.0, &[], 9, &mut vec![]).unwrap_err().to_string();
         assert!(message.contains("track 7 at 12.5 s"), "{message}");
     }
 }
