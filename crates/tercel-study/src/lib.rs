@@ -1,1 +1,3 @@
-//! Placeholder.
+//! Studies and reports: run trackers over scenarios, score them, draw the result.
+
+pub mod report;
