@@ -181,8 +181,10 @@ impl Picture {
 
     /// Distance of each track from the nearest object.
     fn nearest_object(&self) -> Vec<f64> {
-        let nearest = |track| (0..self.objects.len()).map(|object| self.distance(object, track));
-        (0..self.tracks.len()).map(|track| nearest(track).fold(f64::INFINITY, f64::min)).collect()
+        let nearest = |track| {
+            (0..self.objects.len()).map(|object| self.distance(object, track)).fold(f64::INFINITY, f64::min)
+        };
+        (0..self.tracks.len()).map(nearest).collect()
     }
 
     fn tracks_within(&self, near: f64) -> Vec<[f64; 2]> {
