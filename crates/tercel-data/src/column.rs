@@ -1,0 +1,194 @@
+//! What a column of a table holds, and which values it takes.
+
+use std::borrow::Cow;
+use std::f64::consts::PI;
+
+use crate::error::Refusal;
+
+/// One column of a table: the same in every format.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Column {
+    pub name: Cow<'static, str>,
+    pub kind: Kind,
+    /// SI unit; empty for what has none.
+    pub unit: Cow<'static, str>,
+    /// Every row has a value, and so every file has the column.
+    pub needed: bool,
+}
+
+/// What the cells of a column are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A name.
+    Text,
+    /// A whole number from 0.
+    Count,
+    /// A point in time, s. In CSV also a date and time with an offset (RFC 3339).
+    Time,
+    /// A number within limits.
+    Real(Limits),
+}
+
+/// Which numbers a column takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Limits {
+    /// Every number, infinite ones and "not a number" too.
+    None,
+    Finite,
+    NotNegative,
+    Positive,
+    /// In [-π, π].
+    Angle,
+    /// In [0, 1].
+    Probability,
+}
+
+/// The unit in which a file holds its angles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Angles {
+    /// Radians, bearings in [-π, π].
+    #[default]
+    Radians,
+    /// Degrees; a bearing may have any number of turns.
+    Degrees,
+}
+
+impl Column {
+    const fn new(name: &'static str, kind: Kind, unit: &'static str) -> Self {
+        Column { name: Cow::Borrowed(name), kind, unit: Cow::Borrowed(unit), needed: false }
+    }
+
+    pub const fn text(name: &'static str) -> Self {
+        Column::new(name, Kind::Text, "")
+    }
+
+    pub const fn count(name: &'static str) -> Self {
+        Column::new(name, Kind::Count, "")
+    }
+
+    pub const fn time() -> Self {
+        Column::new("time", Kind::Time, "s").needed()
+    }
+
+    pub const fn real(name: &'static str, unit: &'static str, limits: Limits) -> Self {
+        Column::new(name, Kind::Real(limits), unit)
+    }
+
+    /// A finite number whose name or unit is known at run time only.
+    pub fn named(name: String, unit: String) -> Self {
+        Column { name: Cow::Owned(name), unit: Cow::Owned(unit), ..Column::real("", "", Limits::Finite) }
+    }
+
+    pub const fn needed(mut self) -> Self {
+        self.needed = true;
+        self
+    }
+
+    /// The unit in which a file with such angles holds the column.
+    pub fn unit_in(&self, angles: Angles) -> &str {
+        if angles == Angles::Degrees && self.unit == "rad" { "deg" } else { &self.unit }
+    }
+
+    /// What an empty cell should have held.
+    pub fn expected(&self) -> &'static str {
+        match self.kind {
+            Kind::Text => "a name",
+            Kind::Count => "a whole number from 0",
+            Kind::Time => "a time in seconds, or a date and time with an offset (RFC 3339)",
+            Kind::Real(limits) => limits.expected(),
+        }
+    }
+
+    /// The number from a file with such angles, in the unit of the column.
+    pub fn real_from(&self, value: f64, angles: Angles) -> Result<f64, Refusal> {
+        let Kind::Real(limits) = self.kind else {
+            return Limits::Finite.check(value);
+        };
+        if self.unit_in(angles) != "deg" {
+            return limits.check(value);
+        }
+        let angle = Limits::Finite.check(value)?.to_radians();
+        limits.check(if limits == Limits::Angle { wrapped(angle) } else { angle })
+    }
+}
+
+impl Limits {
+    fn expected(self) -> &'static str {
+        match self {
+            Limits::None => "a number",
+            Limits::Finite => "a finite number",
+            Limits::NotNegative => "a finite number that is not negative",
+            Limits::Positive => "a finite number above 0",
+            Limits::Angle => "radians in [-pi, pi]",
+            Limits::Probability => "a probability, 0 to 1",
+        }
+    }
+
+    fn check(self, value: f64) -> Result<f64, Refusal> {
+        // Probabilities are sums of rounded parts, so they may exceed 1 by a little.
+        const SLACK: f64 = 1e-9;
+        let fits = match self {
+            Limits::None => true,
+            Limits::Finite => value.is_finite(),
+            Limits::NotNegative => value.is_finite() && value >= 0.0,
+            Limits::Positive => value.is_finite() && value > 0.0,
+            Limits::Angle => (-PI..=PI).contains(&value),
+            Limits::Probability => (-SLACK..=1.0 + SLACK).contains(&value),
+        };
+        if fits {
+            return Ok(value);
+        }
+        let refusal = Refusal::new(value, self.expected());
+        Err(match self {
+            Limits::Angle if (-720.0..=720.0).contains(&value) && value.abs() > 2.0 * PI => {
+                refusal.helped("the file looks like degrees: pass --angles degrees")
+            }
+            Limits::Angle if value.is_finite() => {
+                refusal.helped("bearings run from -pi to pi: subtract 2 pi from the larger ones")
+            }
+            Limits::Finite | Limits::NotNegative | Limits::Positive if !value.is_finite() => {
+                refusal.helped("leave out rows without a measurement, or leave the cell empty if it may be")
+            }
+            _ => refusal,
+        })
+    }
+}
+
+/// The same angle in [-π, π].
+fn wrapped(angle: f64) -> f64 {
+    let turned = angle.rem_euclid(2.0 * PI);
+    if turned > PI { turned - 2.0 * PI } else { turned }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEARING: Column = Column::real("bearing", "rad", Limits::Angle);
+
+    #[test]
+    fn degrees_of_any_turn_become_radians_within_half_a_turn() {
+        for (degrees, radians) in
+            [(0.0, 0.0), (180.0, PI), (271.4, -1.546_362), (-190.0, 2.967_060), (725.0, 0.087_266)]
+        {
+            let bearing = BEARING.real_from(degrees, Angles::Degrees).unwrap();
+            assert!((bearing - radians).abs() < 1e-5, "{degrees} deg gave {bearing}");
+        }
+    }
+
+    #[test]
+    fn a_bearing_in_degrees_read_as_radians_is_refused_with_the_fix() {
+        let refusal = BEARING.real_from(271.4, Angles::Radians).unwrap_err();
+        assert!(refusal.help.unwrap().contains("--angles degrees"));
+    }
+
+    #[test]
+    fn a_deviation_must_be_positive_and_finite() {
+        let sigma = Column::real("sigma_x", "m", Limits::Positive);
+        assert!(sigma.real_from(1e-300, Angles::Radians).is_ok());
+        for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(sigma.real_from(value, Angles::Radians).is_err());
+        }
+    }
+}

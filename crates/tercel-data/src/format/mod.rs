@@ -1,0 +1,230 @@
+//! The file formats. Each reads and writes a [`Sheet`]; none knows what the columns mean.
+
+pub(crate) mod csv;
+pub(crate) mod json;
+pub(crate) mod parquet;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+use flate2::bufread::MultiGzDecoder;
+
+use crate::column::Column;
+use crate::error::{DataError, Place};
+use crate::layout::{Context, Layout, match_header};
+use crate::metadata::Metadata;
+use crate::options::ReadOptions;
+use crate::sheet::Sheet;
+
+/// A format in which every table can be read and written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// Comma-separated values with a header. The first line may describe the table: `# tercel: {...}`.
+    Csv,
+    /// Apache Parquet. The key `tercel` of the file's metadata describes the table.
+    Parquet,
+    /// One JSON object per line. The first may describe the table: `{"tercel": {...}}`.
+    Ndjson,
+}
+
+const KNOWN: &str = ".csv, .parquet and .ndjson (and .csv.gz and .ndjson.gz when reading)";
+
+impl Format {
+    /// The format that the name of a file tells: `.csv`, `.parquet`, `.ndjson` or `.jsonl`. An ending `.gz` is
+    /// looked past.
+    ///
+    /// # Errors
+    /// [`DataError::UnknownFormat`], which lists the known ones.
+    pub fn of(path: &Path) -> Result<Format, DataError> {
+        let name = path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let name = name.strip_suffix(".gz").unwrap_or(&name);
+        let (_, extension) = name.rsplit_once('.').unwrap_or_default();
+        match extension {
+            "csv" => Ok(Format::Csv),
+            "parquet" => Ok(Format::Parquet),
+            "ndjson" | "jsonl" => Ok(Format::Ndjson),
+            _ => Err(DataError::UnknownFormat { file: file_name(path), known: KNOWN }),
+        }
+    }
+
+    /// The format for writing, which does not compress text.
+    pub(crate) fn to_write(path: &Path) -> Result<Format, DataError> {
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz")) {
+            return Err(DataError::UnknownFormat {
+                file: file_name(path),
+                known: ".csv, .parquet and .ndjson",
+            });
+        }
+        Format::of(path)
+    }
+}
+
+/// The name of a file in messages: as it was given.
+pub(crate) fn file_name(path: &Path) -> Arc<str> {
+    path.to_string_lossy().into()
+}
+
+/// A stream that is decompressed if it begins like a gzip file.
+pub(crate) fn decompressed<'a>(
+    reader: impl Read + 'a,
+    file: &Arc<str>,
+) -> Result<Box<dyn BufRead + 'a>, DataError> {
+    const GZIP: [u8; 2] = [0x1f, 0x8b];
+    let mut reader = BufReader::with_capacity(1 << 16, reader);
+    let start = reader.fill_buf().map_err(|error| DataError::io(file, "read", error))?;
+    // A stream that hands out a single byte first is not looked at twice: no text table begins with 0x1f.
+    if start.starts_with(&GZIP) || start == &GZIP[..1] {
+        return Ok(Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(reader))));
+    }
+    Ok(Box::new(reader))
+}
+
+/// What went wrong while reading: either the system, or compressed data that is broken.
+pub(crate) fn read_error(file: &Arc<str>, error: std::io::Error) -> DataError {
+    use std::io::ErrorKind;
+    match error.kind() {
+        ErrorKind::UnexpectedEof | ErrorKind::InvalidData | ErrorKind::InvalidInput => DataError::Corrupt {
+            place: Place::whole(file),
+            problem: format!("the compressed data is broken: {error}"),
+            help: "the file may be truncated: copy or download it again",
+        },
+        _ => DataError::io(file, "read", error),
+    }
+}
+
+/// Opens a file, decompressed.
+pub(crate) fn open(path: &Path) -> Result<(Arc<str>, Box<dyn BufRead>), DataError> {
+    let file = file_name(path);
+    let opened = std::fs::File::open(path).map_err(|error| DataError::io(&file, "open", error))?;
+    let reader = decompressed(opened, &file)?;
+    Ok((file, reader))
+}
+
+/// What the beginning of a file says: its description and its columns, with where they stand in the file.
+pub(crate) struct Plan {
+    pub metadata: Metadata,
+    pub columns: Vec<(usize, Column)>,
+}
+
+impl Plan {
+    pub fn new<T: Layout>(
+        found: &[String],
+        described: Option<Metadata>,
+        file: &Arc<str>,
+        options: &ReadOptions,
+    ) -> Result<Self, DataError> {
+        let metadata = described.unwrap_or_else(|| T::guess(found));
+        let columns = options.relaxed(T::columns(&metadata));
+        metadata.check_units(&columns, options.angles, file)?;
+        let columns = match_header(found, columns, file)?;
+        Ok(Plan { metadata, columns })
+    }
+
+    pub fn sheet(&self) -> Sheet {
+        Sheet::new(self.columns.iter().map(|(_, column)| column.clone()).collect())
+    }
+}
+
+/// A file as cells.
+pub(crate) struct Content {
+    pub sheet: Sheet,
+    pub metadata: Metadata,
+    /// Names of all columns of the file.
+    pub found: Vec<String>,
+}
+
+/// Reads a table from a stream that is already decompressed.
+pub(crate) fn read_table<T: Layout>(
+    reader: &mut dyn BufRead,
+    format: Format,
+    file: &Arc<str>,
+    options: &ReadOptions,
+) -> Result<T, DataError> {
+    if reader.fill_buf().map_err(|error| read_error(file, error))?.is_empty() {
+        return Err(DataError::Empty { file: Arc::clone(file) });
+    }
+    let Content { sheet, metadata, found } = match format {
+        Format::Csv => csv::read::<T>(reader, file, options)?,
+        Format::Parquet => parquet::read::<T>(reader, file, options)?,
+        Format::Ndjson => return T::from_lines(reader, file, options),
+    };
+    T::from_sheet(&sheet, metadata, &Context { file, options, found: &found })
+}
+
+/// Writes sheets one after another in one of the formats.
+pub(crate) enum SheetWriter<W: Write + Send> {
+    Csv(csv::Writer<W>),
+    Parquet(Box<parquet::Writer<W>>),
+    Ndjson(json::Writer<W>),
+}
+
+impl<W: Write + Send> SheetWriter<W> {
+    /// Begins a file with these columns.
+    pub fn new(
+        sink: W,
+        format: Format,
+        columns: &[Column],
+        metadata: Metadata,
+        file: &Arc<str>,
+    ) -> Result<Self, DataError> {
+        let mut names = std::collections::HashSet::new();
+        if let Some(twice) = columns.iter().find(|column| !names.insert(column.name.as_ref())) {
+            return Err(DataError::Column {
+                file: Arc::clone(file),
+                column: twice.name.to_string(),
+                problem: "would be there twice",
+                help: "give components and modes of the state names of their own".to_owned(),
+            });
+        }
+        let json = metadata.with_units(columns).to_json();
+        Ok(match format {
+            Format::Csv => SheetWriter::Csv(csv::Writer::new(sink, columns, &json, file)?),
+            Format::Parquet => {
+                SheetWriter::Parquet(Box::new(parquet::Writer::new(sink, columns, json, file)?))
+            }
+            Format::Ndjson => SheetWriter::Ndjson(json::Writer::new(sink, &json, file)?),
+        })
+    }
+
+    /// Appends a sheet, whose columns must be those with which the file began.
+    pub fn write(&mut self, sheet: &Sheet, file: &Arc<str>) -> Result<(), DataError> {
+        // A file that we write must be one that we read.
+        if let Some((row, column, refusal)) = sheet.first_refused() {
+            return Err(refusal.at(sheet.place(file, row), &column.name));
+        }
+        match self {
+            SheetWriter::Csv(writer) => writer.write(sheet, file),
+            SheetWriter::Parquet(writer) => writer.write(sheet, file),
+            SheetWriter::Ndjson(writer) => writer.write(sheet, file),
+        }
+    }
+
+    /// Hands on what is still held back, where the format allows it.
+    pub fn flush(&mut self, file: &Arc<str>) -> Result<(), DataError> {
+        match self {
+            SheetWriter::Csv(writer) => writer.flush(file),
+            SheetWriter::Parquet(_) => Ok(()),
+            SheetWriter::Ndjson(writer) => writer.flush(file),
+        }
+    }
+
+    /// Completes the file.
+    pub fn finish(self, file: &Arc<str>) -> Result<W, DataError> {
+        match self {
+            SheetWriter::Csv(writer) => writer.finish(file),
+            SheetWriter::Parquet(writer) => writer.finish(file),
+            SheetWriter::Ndjson(writer) => writer.finish(file),
+        }
+    }
+}
+
+/// Writes a number so that reading it gives the same bits, and very large and small ones stay short.
+pub(crate) fn write_number(number: f64, text: &mut Vec<u8>) -> std::io::Result<()> {
+    let magnitude = number.abs();
+    if magnitude != 0.0 && magnitude.is_finite() && !(1e-5..1e16).contains(&magnitude) {
+        write!(text, "{number:e}")
+    } else {
+        write!(text, "{number}")
+    }
+}

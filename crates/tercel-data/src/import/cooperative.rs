@@ -1,0 +1,131 @@
+//! What aircraft and ships say about themselves, as detections and as truth.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use tercel_core::geo::{Geodetic, LocalFrame};
+
+use super::{ImportOptions, Imported, LeftOut};
+use crate::error::{DataError, Place};
+use crate::table::{Detection, Detections, Noise, Observation, Origin, Scan, Truth, Truths};
+
+/// One report of an object about itself.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Report {
+    /// Unix seconds.
+    pub time: f64,
+    pub object: Option<Arc<str>>,
+    /// WGS84, rad.
+    pub latitude: f64,
+    /// WGS84, rad.
+    pub longitude: f64,
+    /// m, where it was reported.
+    pub altitude: Option<f64>,
+    /// m/s over ground, and course clockwise from north, rad.
+    pub motion: Option<(f64, f64)>,
+}
+
+/// The tables of reports, in the order of time.
+///
+/// Reports of one time are one scan. Without an origin the local frame lies at the median position, on the
+/// ellipsoid. An object that does not report its altitude is placed at the one that it reported last, so that its
+/// track has no jump, and without one on the ellipsoid; its detection then has no `z`.
+pub(super) fn tables(
+    mut reports: Vec<Report>,
+    sensor: &str,
+    left_out: Vec<LeftOut>,
+    options: &ImportOptions,
+    file: &Arc<str>,
+) -> Result<Imported, DataError> {
+    reports.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let Some(origin) = options.origin.or_else(|| middle(&reports)) else {
+        return Ok(Imported {
+            truths: options.truths.then(Truths::default),
+            left_out,
+            ..Imported::default()
+        });
+    };
+    let frame = frame(origin, file)?;
+    let sensor: Arc<str> = sensor.into();
+    let mut altitudes: HashMap<Option<Arc<str>>, f64> = HashMap::new();
+    let mut scans: Vec<Scan> = Vec::new();
+    let mut truths = Vec::new();
+    for (report, id) in reports.into_iter().zip(0..) {
+        if let Some(altitude) = report.altitude {
+            altitudes.insert(report.object.clone(), altitude);
+        }
+        let altitude = altitudes.get(&report.object).copied().unwrap_or(0.0);
+        let place = Geodetic { latitude: report.latitude, longitude: report.longitude, altitude };
+        let enu = frame.to_enu(&place);
+        let z = report.altitude.map(|_| enu.z);
+        if let Some(object) = report.object.as_ref().filter(|_| options.truths) {
+            truths.push(Truth {
+                time: report.time,
+                object: Arc::clone(object),
+                position: [enu.x, enu.y],
+                z,
+                velocity: report.motion.and_then(|motion| velocity(&frame, place, motion)),
+                extent: None,
+            });
+        }
+        let detection = Detection {
+            id,
+            observation: Observation::Position { x: enu.x, y: enu.y, z },
+            noise: Noise::default(),
+            truth: report.object,
+        };
+        match scans.last_mut().filter(|scan| scan.time == report.time) {
+            Some(scan) => scan.detections.push(detection),
+            None => scans.push(Scan {
+                time: report.time,
+                sensor: Arc::clone(&sensor),
+                position: None,
+                detections: vec![detection],
+            }),
+        }
+    }
+    let origin = Some(origin);
+    Ok(Imported {
+        detections: Detections { origin, scans },
+        truths: options.truths.then_some(Truths { origin, rows: truths }),
+        left_out,
+    })
+}
+
+fn frame(origin: Origin, file: &Arc<str>) -> Result<LocalFrame, DataError> {
+    let Origin { latitude, longitude, altitude } = origin;
+    LocalFrame::new(Geodetic { latitude, longitude, altitude }).map_err(|error| DataError::Row {
+        place: Place::whole(file),
+        problem: format!("the origin of the local frame is not on the Earth: {error}"),
+        help: "latitude and longitude of the origin are radians, the altitude is m",
+    })
+}
+
+/// Velocity in the local frame: north at the object is not quite north at the origin.
+fn velocity(frame: &LocalFrame, place: Geodetic, (speed, course): (f64, f64)) -> Option<[f64; 2]> {
+    let there = LocalFrame::new(place).ok()?;
+    let ecef = there.velocity_from_enu(&Vector3::new(speed * course.sin(), speed * course.cos(), 0.0));
+    let enu = frame.velocity_to_enu(&ecef);
+    Some([enu.x, enu.y])
+}
+
+/// The median position of the reports, on the ellipsoid.
+fn middle(reports: &[Report]) -> Option<Origin> {
+    // Longitudes near the date line are turned so that they do not fall apart.
+    let first = reports.first()?.longitude;
+    let near = |longitude: f64| first + turned(longitude - first);
+    let latitude = median(reports.iter().map(|report| report.latitude).collect())?;
+    let longitude = turned(median(reports.iter().map(|report| near(report.longitude)).collect())?);
+    Some(Origin { latitude, longitude, altitude: 0.0 })
+}
+
+fn turned(angle: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    (angle + PI).rem_euclid(TAU) - PI
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}

@@ -1,0 +1,142 @@
+//! Finding the columns of a table in the header of a file.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use crate::column::Column;
+use crate::error::DataError;
+
+/// For each column that the file has, where it stands there.
+///
+/// Columns of the file that are not known are left out, unless their name is so near to a missing one that it
+/// looks like a slip of the pen.
+pub(crate) fn match_header(
+    found: &[String],
+    columns: Vec<Column>,
+    file: &Arc<str>,
+) -> Result<Vec<(usize, Column)>, DataError> {
+    let mut seen = HashSet::new();
+    if let Some(twice) = found.iter().find(|name| !seen.insert(name.as_str())) {
+        return Err(DataError::Column {
+            file: Arc::clone(file),
+            column: twice.clone(),
+            problem: "is there twice",
+            help: "rename or remove one of them".to_owned(),
+        });
+    }
+    let known: HashSet<&str> = columns.iter().map(|column| column.name.as_ref()).collect();
+    let strangers: Vec<&str> =
+        found.iter().map(String::as_str).filter(|name| !known.contains(name)).collect();
+    let absent = |column: &&Column| !seen.contains(column.name.as_ref());
+    let missing: Vec<&str> = columns
+        .iter()
+        .filter(absent)
+        .filter(|column| column.needed)
+        .map(|column| column.name.as_ref())
+        .collect();
+    if !missing.is_empty() {
+        return Err(missing_columns(file, &missing, found));
+    }
+    let absent: Vec<Column> = columns.iter().filter(absent).cloned().collect();
+    if let Some(slip) = strangers.iter().find_map(|stranger| near_miss(stranger, &absent, file)) {
+        return Err(slip);
+    }
+    Ok(columns
+        .into_iter()
+        .filter_map(|column| found.iter().position(|name| *name == column.name).map(|at| (at, column)))
+        .collect())
+}
+
+/// The error for a column that is not known but almost one of these, if it is.
+pub(crate) fn near_miss(stranger: &str, columns: &[Column], file: &Arc<str>) -> Option<DataError> {
+    let meant = columns.iter().find(|column| nearest(&column.name, &[stranger]).is_some())?;
+    Some(DataError::Column {
+        file: Arc::clone(file),
+        column: stranger.to_owned(),
+        problem: "is not known",
+        help: format!("did you mean `{}`?", meant.name),
+    })
+}
+
+/// The error for columns that are not there, with the found ones that come nearest.
+pub(crate) fn missing_columns(file: &Arc<str>, missing: &[&str], found: &[String]) -> DataError {
+    let candidates: Vec<&str> = found.iter().map(String::as_str).collect();
+    let renames: Vec<String> = missing
+        .iter()
+        .filter_map(|name| nearest(name, &candidates).map(|near| format!("rename `{near}` to `{name}`")))
+        .collect();
+    let help = if !renames.is_empty() {
+        renames.join(", ")
+    } else if found.len() == 1 && found[0].contains([';', '\t']) {
+        "separate the columns by commas".to_owned()
+    } else if missing.contains(&"sensor") {
+        "add the column, or name the one sensor: --sensor NAME".to_owned()
+    } else {
+        "add the column, or rename the one that holds it".to_owned()
+    };
+    DataError::MissingColumns {
+        file: Arc::clone(file),
+        missing: missing.iter().map(|&name| name.to_owned()).collect(),
+        found: found.to_vec(),
+        help,
+    }
+}
+
+/// The candidate whose name differs least from `name`, if it is near enough for a slip.
+fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    // Names of one or two letters are all near to each other, so only their case may differ.
+    let allowed = match name.len() {
+        0..=2 => 0,
+        3..=9 => 1,
+        _ => 2,
+    };
+    candidates
+        .iter()
+        .map(|candidate| (distance(&name.to_lowercase(), &candidate.trim().to_lowercase()), *candidate))
+        .filter(|(distance, _)| *distance <= allowed)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// Insertions, deletions, replacements and swaps of neighbours that turn one text into the other (optimal string
+/// alignment).
+fn distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut before: Vec<usize> = Vec::new();
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let replaced = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut least = replaced.min(last[j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                least = least.min(before[j - 2] + 1);
+            }
+            row.push(least);
+        }
+        before = std::mem::replace(&mut last, row);
+    }
+    last[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_distance_counts_single_edits() {
+        assert_eq!(distance("bearing", "bearing"), 0);
+        assert_eq!(distance("bearing", "baering"), 1);
+        assert_eq!(distance("bearing", "barings"), 2);
+        assert_eq!(distance("sensor", "sensors"), 1);
+        assert_eq!(distance("", "abc"), 3);
+    }
+
+    #[test]
+    fn short_names_differ_in_case_only() {
+        assert_eq!(nearest("x", &["y", "X"]), Some("X"));
+        assert_eq!(nearest("x", &["y", "z"]), None);
+        assert_eq!(nearest("vx", &["vy"]), None);
+        assert_eq!(nearest("sensor_x", &["sensor_id"]), None);
+    }
+}

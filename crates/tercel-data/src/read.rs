@@ -1,0 +1,130 @@
+//! Reading tables, by the name of a file or from a stream.
+
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::error::DataError;
+use crate::format::{Format, decompressed, open, read_table};
+use crate::layout::Layout;
+use crate::options::ReadOptions;
+use crate::table::{Detections, Metrics, Tracks, Truths};
+
+fn from_path<T: Layout>(path: &Path, options: &ReadOptions) -> Result<T, DataError> {
+    let format = Format::of(path)?;
+    let (file, mut reader) = open(path)?;
+    read_table(reader.as_mut(), format, &file, options)
+}
+
+/// Reads detections in a format that was chosen by hand.
+pub(crate) fn read_as(path: &Path, format: Format, options: &ReadOptions) -> Result<Detections, DataError> {
+    let (file, mut reader) = open(path)?;
+    read_table(reader.as_mut(), format, &file, options)
+}
+
+fn from_stream<T: Layout>(
+    reader: impl Read,
+    format: Format,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<T, DataError> {
+    let file: Arc<str> = name.into();
+    let mut reader = decompressed(reader, &file)?;
+    read_table(reader.as_mut(), format, &file, options)
+}
+
+/// Reads detections from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+///
+/// Of the columns only `time`, `sensor` and either `x` and `y` or `bearing` are needed. Rows of one scan follow
+/// each other and have the same number in `scan`; without that column, the same time and sensor. Where there is a
+/// column `detection`, a row without a number in it is a scan in which nothing was seen; without that column, a
+/// row without a measurement is.
+///
+/// # Errors
+/// A [`DataError`] that says where the file is wrong, and what was expected.
+pub fn read_detections(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Detections, DataError> {
+    from_path(path.as_ref(), options)
+}
+
+/// Reads detections as [`read_detections`] does, from a stream; `name` stands for it in messages.
+///
+/// # Errors
+/// A [`DataError`] that says where the stream is wrong, and what was expected.
+pub fn read_detections_from(
+    reader: impl Read,
+    format: Format,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<Detections, DataError> {
+    from_stream(reader, format, name, options)
+}
+
+/// Reads the truth from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+///
+/// The columns `time`, `object`, `x` and `y` are needed.
+///
+/// # Errors
+/// A [`DataError`] that says where the file is wrong, and what was expected.
+pub fn read_truths(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Truths, DataError> {
+    from_path(path.as_ref(), options)
+}
+
+/// Reads the truth as [`read_truths`] does, from a stream; `name` stands for it in messages.
+///
+/// # Errors
+/// A [`DataError`] that says where the stream is wrong, and what was expected.
+pub fn read_truths_from(
+    reader: impl Read,
+    format: Format,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<Truths, DataError> {
+    from_stream(reader, format, name, options)
+}
+
+/// Reads tracks from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+///
+/// Tracks of other programs need the columns `time`, `track`, `x` and `y` only: a missing status is read as
+/// confirmed, a missing existence probability as 1, and a missing covariance is empty.
+///
+/// # Errors
+/// A [`DataError`] that says where the file is wrong, and what was expected.
+pub fn read_tracks(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Tracks, DataError> {
+    from_path(path.as_ref(), options)
+}
+
+/// Reads tracks as [`read_tracks`] does, from a stream; `name` stands for it in messages.
+///
+/// # Errors
+/// A [`DataError`] that says where the stream is wrong, and what was expected.
+pub fn read_tracks_from(
+    reader: impl Read,
+    format: Format,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<Tracks, DataError> {
+    from_stream(reader, format, name, options)
+}
+
+/// Reads metrics from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+///
+/// An empty `value` is not a number.
+///
+/// # Errors
+/// A [`DataError`] that says where the file is wrong, and what was expected.
+pub fn read_metrics(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Metrics, DataError> {
+    from_path(path.as_ref(), options)
+}
+
+/// Reads metrics as [`read_metrics`] does, from a stream; `name` stands for it in messages.
+///
+/// # Errors
+/// A [`DataError`] that says where the stream is wrong, and what was expected.
+pub fn read_metrics_from(
+    reader: impl Read,
+    format: Format,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<Metrics, DataError> {
+    from_stream(reader, format, name, options)
+}
