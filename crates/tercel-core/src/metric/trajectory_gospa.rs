@@ -41,7 +41,9 @@ use crate::error::FilterError;
 ///
 /// So no general solver is needed, and the time follows the collisions, not the size. The difference of the bounds is
 /// part of the result, as [`gap`](TrajectoryGospaScore::gap): it is at most 1e-10 of `cᵖ/2` for each step of each
-/// trajectory, or more where 100 rounds of step 4 do not suffice, which we have not met in practice.
+/// trajectory, or more where 100 rounds of step 4 do not suffice. Ten objects against thirty tracks over 500 steps take
+/// about 1 ms when the tracks follow the objects, and about a second when the two have nothing to do with each other and
+/// meet all the time; single cases of the latter kind took 10 s.
 ///
 /// ## Use it when
 /// whole tracks are judged: broken tracks, swaps, late starts. Choose `γ` by how many metres of error a switch is worth.
