@@ -2,6 +2,8 @@
 //!
 //! Needs a Chromium (`CHROMIUM`, or on the search path); without one each test says so and passes.
 #![cfg(unix)]
+// Helpers of tests fail like tests.
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 #[path = "support/browser.rs"]
 mod browser;
