@@ -190,6 +190,17 @@ fn the_pointer_tells_what_is_under_it() {
 }
 
 #[test]
+fn the_plan_can_be_saved_as_a_picture() {
+    let Some(mut browser) = browse(&harbour()) else { return };
+    browser.value("HTMLAnchorElement.prototype.click = function () { window.saved = this.href; }; 1");
+    browser.value("document.querySelector('.plan-frame .modebar-btn').click()");
+    browser.wait("window.saved !== undefined");
+    // A picture of that size with nothing in it takes less.
+    assert!(number(&mut browser, "saved.startsWith('data:image/png') ? saved.length : 0") > 50_000.0);
+    assert_eq!(browser.complaints(), [""; 0]);
+}
+
+#[test]
 fn printing_leaves_the_page_as_it_was() {
     let Some(mut browser) = browse(&harbour()) else { return };
     let (plan, width) =
