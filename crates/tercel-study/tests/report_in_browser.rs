@@ -2,6 +2,8 @@
 //!
 //! Needs a Chromium (`CHROMIUM`, or on the search path); without one each test says so and passes.
 #![cfg(unix)]
+// Helpers of tests fail like tests.
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 #[path = "support/browser.rs"]
 mod browser;
@@ -188,6 +190,30 @@ fn the_pointer_tells_what_is_under_it() {
 }
 
 #[test]
+fn the_plan_can_be_saved_as_a_picture() {
+    let Some(mut browser) = browse(&harbour()) else { return };
+    browser.value("HTMLAnchorElement.prototype.click = function () { window.saved = this.href; }; 1");
+    browser.value("document.querySelector('.plan-frame .modebar-btn').click()");
+    browser.wait("window.saved !== undefined");
+    // A picture of that size with nothing in it takes less.
+    assert!(number(&mut browser, "saved.startsWith('data:image/png') ? saved.length : 0") > 50_000.0);
+    assert_eq!(browser.complaints(), [""; 0]);
+}
+
+#[test]
+fn printing_leaves_the_page_as_it_was() {
+    let Some(mut browser) = browse(&harbour()) else { return };
+    let (plan, width) =
+        (browser.value("painted()"), browser.value("document.querySelector('.plan').clientWidth"));
+    let paper = browser.call("Page.printToPDF", json!({}));
+    assert!(paper["data"].as_str().unwrap().len() > 10_000);
+    browser.wait(&format!("document.querySelector('.plan').clientWidth === {width}"));
+    browser.settle();
+    assert_eq!(browser.value("painted()"), plan);
+    assert_eq!(browser.complaints(), [""; 0]);
+}
+
+#[test]
 fn names_from_the_data_stay_text() {
     let attack = "</script><script>window.broken = true</script><img src=x onerror='window.broken = true'>";
     let mut scene = scene::scene(&scene::Size { boats: 2, scans: 10, clutter: 2 });
@@ -221,4 +247,27 @@ fn a_report_of_nothing_opens_quietly() {
     );
     browser.press("ArrowRight", 39);
     assert_eq!(browser.complaints(), [""; 0]);
+}
+
+#[test]
+fn twenty_thousand_detections_and_three_hundred_tracks_follow_the_slider() {
+    let scene = scene::scene(&scene::Size { boats: 75, scans: 160, clutter: 90 });
+    let count: usize = scene.detections.scans.iter().map(|scan| scan.detections.len()).sum();
+    assert!(count > 20_000);
+    let report = scene::report("Crowd", &scene).unwrap();
+    let Some(mut browser) = browse(&report) else { return };
+    browser.value("layer('tentative')");
+    // The last steps of the slider, where the whole recording is in the picture.
+    let took = browser.value(
+        "(async () => { const took = [];
+          for (let index = 300; index < 320; index += 1) {
+            const before = performance.now();
+            slide(index);
+            await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+            took.push(performance.now() - before); }
+          return took.sort((a, b) => a - b)[10]; })()",
+    );
+    println!("{count} detections, 300 tracks: {took} ms for a step of the slider");
+    // On an idle machine it is a tenth of that; as elements of a drawing they would take longer.
+    assert!(took.as_f64().unwrap() < 1000.0, "{took} ms");
 }

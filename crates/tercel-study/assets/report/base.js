@@ -49,10 +49,11 @@ function style(name) {
 const TRACK_COLOURS = 10;
 const SENSOR_COLOURS = 6;
 
-/** The colours of the moment, read anew when the scheme changes. */
+/** Colours and font of the moment, read anew when the scheme changes. */
 function readColours() {
   const row = (stem, count) => Array.from({ length: count }, (_, i) => style(`--${stem}-${i}`));
   return {
+    font: style("--font"),
     ink: style("--ink"),
     muted: style("--muted"),
     grid: style("--grid"),
@@ -63,18 +64,6 @@ function readColours() {
     sensors: row("sensor", SENSOR_COLOURS),
     parts: row("part", 6),
   };
-}
-
-/** Calls back when the page turns dark or light, and around printing, which is always light. */
-function onColourChange(callback) {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", callback);
-  const scheme = (value) => () => {
-    if (value) document.documentElement.dataset.scheme = value;
-    else delete document.documentElement.dataset.scheme;
-    callback();
-  };
-  addEventListener("beforeprint", scheme("light"));
-  addEventListener("afterprint", scheme(null));
 }
 
 /** Text for labels of plotly, which reads some tags: none of ours shall be taken for one. */
@@ -103,7 +92,7 @@ function axisStyle(colours, title) {
 /** The layout that all plots start from. */
 function layoutStyle(colours) {
   return {
-    font: { family: style("--font"), size: 12, color: colours.ink },
+    font: { family: colours.font, size: 12, color: colours.ink },
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     margin: { l: 62, r: 14, t: 10, b: 42 },
@@ -113,9 +102,9 @@ function layoutStyle(colours) {
   };
 }
 
-/** Draws a plot again in the size that its host has, or in another width. */
-function fitPlot(plot, width = plot.clientWidth) {
-  const height = plot.clientHeight;
+/** Draws a plot again in the size that its host has. */
+function fitPlot(plot) {
+  const { clientWidth: width, clientHeight: height } = plot;
   const { width: oldWidth, height: oldHeight } = plot._fullLayout;
   if (width > 0 && height > 0 && (width !== oldWidth || height !== oldHeight)) Plotly.relayout(plot, { width, height });
 }

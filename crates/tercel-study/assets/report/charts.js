@@ -1,24 +1,25 @@
 // Charts: curves, steps and stacked areas, over the time of a recording or any other quantity.
 
 /**
- * Draws a chart in `host`. With `moveTo`, a click calls it with the abscissa, and the result's `mark(x)` moves a line.
+ * Draws a chart in `host`. A chart over the time of a recording has a `clock`: it spans `[0, clock.end]`, a click calls
+ * `clock.moveTo(time)`, and `mark(time)` of the result moves a line.
  */
-function createChart(host, chart, moveTo) {
+function createChart(host, chart, clock) {
   const title = uniqueId("chart");
   const plot = element("div", { class: "chart-plot" });
   const line = element("div", { class: "chart-time", hidden: true });
-  const unit = chart.unit ? `, ${chart.unit}` : "";
   const box = element("div", { class: "chart-box" }, plot, line);
   const caption = element("figcaption", { id: title }, chart.title);
   host.append(element("figure", { class: "chart-figure", "aria-labelledby": title }, caption, box));
   let colours = readColours();
   let marked = null;
 
-  const layout = () => chartLayout(colours, chart, (chart.parts.length === 1 ? chart.parts[0].name : chart.title) + unit);
+  const range = clock && clock.end > 0 ? [0, clock.end] : undefined;
+  const layout = () => chartLayout(colours, chart, range);
   Plotly.newPlot(plot, chartTraces(chart, colours), layout(), {
     displaylogo: false,
     displayModeBar: false,
-    doubleClick: "autosize",
+    doubleClick: "reset",
   });
 
   function place() {
@@ -32,9 +33,9 @@ function createChart(host, chart, moveTo) {
 
   followSize(plot);
   plot.on("plotly_afterplot", place);
-  if (moveTo) {
+  if (clock) {
     plot.classList.add("clickable");
-    plot.on("plotly_click", (event) => moveTo(event.points[0].x));
+    plot.on("plotly_click", (event) => clock.moveTo(event.points[0].x));
   }
   return {
     mark(x) {
@@ -45,7 +46,7 @@ function createChart(host, chart, moveTo) {
       colours = readColours();
       Plotly.react(plot, chartTraces(chart, colours), layout());
     },
-    fit: (width) => fitPlot(plot, width),
+    fit: () => fitPlot(plot),
   };
 }
 
@@ -68,11 +69,11 @@ function chartTraces(chart, colours) {
   });
 }
 
-function chartLayout(colours, chart, ordinate) {
+function chartLayout(colours, chart, range) {
   return {
     ...layoutStyle(colours),
-    xaxis: { ...axisStyle(colours, chart.abscissa), showgrid: false, hoverformat: ".1f" },
-    yaxis: { ...axisStyle(colours, ordinate), rangemode: "tozero", fixedrange: true },
+    xaxis: { ...axisStyle(colours, chart.abscissa), range, showgrid: false, hoverformat: ".1f" },
+    yaxis: { ...axisStyle(colours, chart.unit), rangemode: "tozero", fixedrange: true },
     margin: { l: 66, r: 16, t: chart.parts.length > 1 ? 28 : 10, b: 42 },
     hovermode: "x unified",
     hoverdistance: -1,

@@ -16,8 +16,10 @@ function start() {
     charts.push(createChart(section, data[Number(section.dataset.chart)]));
   }
   const parts = [...pictures, ...charts];
-  onColourChange(() => parts.forEach((part) => part.recolour()));
-  fitPrint(parts);
+  const recolour = () => parts.forEach((part) => part.recolour());
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+  addEventListener("beforeprint", () => layOutFor(true, parts));
+  addEventListener("afterprint", () => layOutFor(false, parts));
   document.addEventListener("keydown", (event) => {
     if (!active || event.ctrlKey || event.altKey || event.metaKey || ownsKey(event.target, event.key)) return;
     if (active.key(event)) event.preventDefault();
@@ -32,11 +34,13 @@ function ownsKey(target, key) {
   return Boolean(target.closest(".scroll")) && (key === "Home" || key === "End");
 }
 
-/** Paper is narrower than most windows: plots are drawn again in its width, and back afterwards. */
-function fitPrint(parts) {
-  const paper = 700;
-  addEventListener("beforeprint", () => parts.forEach((part) => part.fit(paper)));
-  addEventListener("afterprint", () => parts.forEach((part) => part.fit()));
+/** Paper is always light and narrower than most windows: plots are drawn again for it, and back afterwards. */
+function layOutFor(printing, parts) {
+  document.documentElement.toggleAttribute("data-printing", printing);
+  for (const part of parts) {
+    part.recolour();
+    part.fit();
+  }
 }
 
 start();

@@ -1,5 +1,5 @@
-// Paints the marks of a plan on a canvas. 20,000 detections take about ten milliseconds this way; as elements of a
-// drawing they would take a second each time that the slider moves.
+// Paints the marks of a plan on a canvas. 20,000 detections take about a tenth of a second this way without a
+// graphics card; as elements of a drawing they would take a second, whatever moves.
 
 const MARKS = ["disc", "cross", "square", "triangle", "plus", "diamond"];
 
@@ -33,42 +33,51 @@ function paintDetections(context, model, view, scale, colours, from) {
     const mark = MARKS[sensor.index % MARKS.length];
     const current = scanAt(sensor, view.time);
     const last = lastAtMost(sensor.times, view.time);
-    const old = new Path2D();
-    for (let k = last; k >= 0 && sensor.times[k] >= from; k -= 1) {
-      if (sensor.scans[k] !== current) addScan(old, model, sensor.scans[k], scale, mark, 1.7);
-    }
     // A cloud of many detections stays a cloud: each mark is fainter.
     const crowd = Math.min(1, 3000 / Math.max(detections.x.length, 1));
+    context.strokeStyle = colour;
+    context.fillStyle = colour;
     context.globalAlpha = 0.28 + 0.27 * crowd;
-    strokeMarks(context, old, mark, colour);
+    const older = [];
+    for (let k = last; k >= 0 && sensor.times[k] >= from; k -= 1) {
+      if (sensor.scans[k] !== current) older.push(sensor.scans[k]);
+    }
+    paintScans(context, model, older, scale, mark, 1.7);
     context.globalAlpha = 1;
     if (current >= 0) {
-      const now = new Path2D();
-      addScan(now, model, current, scale, mark, 3);
-      strokeMarks(context, now, mark, colour);
+      paintScans(context, model, [current], scale, mark, 3);
       paintRays(context, model, current, scale, colour);
     }
   }
 }
 
-function strokeMarks(context, path, mark, colour) {
-  const lines = mark === "cross" || mark === "plus";
-  context.strokeStyle = colour;
-  context.fillStyle = colour;
-  context.lineWidth = 1.4;
-  if (lines) context.stroke(path);
-  else context.fill(path);
-}
+// One path of all marks takes more than twice as long to fill as many short ones.
+const MARKS_PER_PATH = 100;
 
-function addScan(path, model, k, scale, mark, size) {
-  const { x, y, first } = model.detections;
-  const bearing = model.detections.bearing;
-  for (let i = first[k]; i < first[k + 1]; i += 1) {
-    if (bearing && bearing[i] !== null) continue;
-    const px = scale.px(x[i]);
-    const py = scale.py(y[i]);
-    if (scale.holds(px, py)) addMark(path, mark, px, py, size);
+function paintScans(context, model, list, scale, mark, size) {
+  const { x, y, first, bearing } = model.detections;
+  const lines = mark === "cross" || mark === "plus";
+  let path = new Path2D();
+  let marks = 0;
+  const flush = () => {
+    if (lines) context.stroke(path);
+    else context.fill(path);
+    path = new Path2D();
+    marks = 0;
+  };
+  context.lineWidth = 1.4;
+  for (const k of list) {
+    for (let i = first[k]; i < first[k + 1]; i += 1) {
+      if (bearing && bearing[i] !== null) continue;
+      const px = scale.px(x[i]);
+      const py = scale.py(y[i]);
+      if (!scale.holds(px, py)) continue;
+      addMark(path, mark, px, py, size);
+      marks += 1;
+      if (marks === MARKS_PER_PATH) flush();
+    }
   }
+  flush();
 }
 
 function addMark(path, mark, x, y, size) {
@@ -259,7 +268,7 @@ function labelTrack(track, row, view, colours, from, labels) {
 /** Sensors where they are, with the way that they came. Sensors at one place share a mark. */
 function paintSensors(context, model, view, scale, colours, labels) {
   const { scans } = model;
-  const places = new Map();
+  const places = [];
   for (const sensor of model.sensors) {
     const last = lastAtMost(sensor.times, view.time);
     const k = last < 0 ? sensor.scans[0] : sensor.scans[last];
@@ -272,11 +281,12 @@ function paintSensors(context, model, view, scale, colours, labels) {
       pen = drawTo(context, scale, scans.x[sensor.scans[i]], scans.y[sensor.scans[i]], pen);
     }
     context.stroke();
-    const place = `${Math.round(scale.px(scans.x[k]) / 8)},${Math.round(scale.py(scans.y[k]) / 8)}`;
-    if (!places.has(place)) places.set(place, { x: scans.x[k], y: scans.y[k], names: [] });
-    places.get(place).names.push(sensor.name);
+    const here = { x: scans.x[k], y: scans.y[k], names: [sensor.name] };
+    const near = places.find((place) => scale.metre * Math.hypot(place.x - here.x, place.y - here.y) < 8);
+    if (near) near.names.push(sensor.name);
+    else places.push(here);
   }
-  for (const { x, y, names } of places.values()) {
+  for (const { x, y, names } of places) {
     const path = new Path2D();
     addMark(path, "triangle", scale.px(x), scale.py(y), 7);
     context.fillStyle = colours.ink;
@@ -293,7 +303,7 @@ function paintLabels(context, labels, scale, colours) {
   context.textBaseline = "middle";
   context.lineJoin = "round";
   for (const label of [...labels].sort((a, b) => rank(a) - rank(b))) {
-    context.font = `${label.strong ? 600 : 400} 12px ${style("--font")}`;
+    context.font = `${label.strong ? 600 : 400} 12px ${colours.font}`;
     const text = label.text.length > 24 ? label.text.slice(0, 23) + "…" : label.text;
     const x = scale.px(label.x) + 9;
     const y = scale.py(label.y) + (label.below ? 11 : -10);

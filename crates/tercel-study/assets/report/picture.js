@@ -48,7 +48,8 @@ function createPicture(section, data) {
     table.refill();
   });
   plan = createPlan(hosts.plan, model, view, choose);
-  for (const chart of data.charts) charts.push(createChart(hosts.charts, chart, player.moveTo));
+  const clock = { end: model.end, moveTo: player.moveTo };
+  for (const chart of data.charts) charts.push(createChart(hosts.charts, chart, clock));
   player.moveTo(model.end);
 
   const parts = [plan, ...charts];
@@ -58,7 +59,7 @@ function createPicture(section, data) {
       parts.forEach((part) => part.recolour());
       table.refill();
     },
-    fit: (width) => parts.forEach((part) => part.fit(width)),
+    fit: () => parts.forEach((part) => part.fit()),
   };
 }
 
@@ -71,11 +72,12 @@ function layOutPicture(section, model) {
     charts: element("div", { class: "charts" }),
   };
   const notes = model.notes.map((note) => element("p", { class: "note" }, note));
+  const epoch = model.start ? [element("p", { class: "hint" }, `Times count from ${numeral(model.start, 3)} s of the data.`)] : [];
   section.append(
     element(
       "div",
       { class: "picture-grid" },
-      element("div", { class: "picture-main" }, element("h2", {}, "Plan view"), ...notes, hosts.plan, hosts.player),
+      element("div", { class: "picture-main" }, element("h2", {}, "Plan view"), ...notes, hosts.plan, hosts.player, ...epoch),
       element("div", { class: "picture-side" }, hosts.layers, hosts.tracks),
     ),
     hosts.charts,

@@ -68,8 +68,8 @@ function createPlan(host, model, view, choose) {
       const up = height / metre / 2;
       Plotly.relayout(frame, { "xaxis.range": [x - across, x + across], "yaxis.range": [y - up, y + up] });
     },
-    fit(width) {
-      fitPlot(frame, width);
+    fit() {
+      fitPlot(frame);
       paint();
     },
   };
@@ -94,9 +94,12 @@ function planLayout(colours, old) {
   const x = { ...axis("East, m"), constrain: "range" };
   const y = { ...axis("North, m"), scaleanchor: "x", scaleratio: 1, constrain: "range" };
   // A change of colours keeps what the reader zoomed to.
-  if (old && old.xaxis.range) {
+  if (old && old.xaxis.autorange === false) {
     x.range = old.xaxis.range.slice();
     y.range = old.yaxis.range.slice();
+  } else {
+    x.autorange = true;
+    y.autorange = true;
   }
   const layout = { ...layoutStyle(colours), xaxis: x, yaxis: y, dragmode: (old && old.dragmode) || "pan" };
   return { ...layout, hovermode: false, showlegend: false, margin: { l: 66, r: 16, t: 34, b: 46 } };

@@ -89,7 +89,7 @@ mod tests {
     fn numbers_are_rounded_and_short() {
         assert_eq!(json(Number::milli(12.0)), "12");
         assert_eq!(json(Number::milli(-0.0001)), "0");
-        assert_eq!(json(Number::milli(1234.567_891)), "1234.568");
+        assert_eq!(json(Number::milli(1_234.567_891)), "1234.568");
         assert_eq!(json(Number::significant(0.000_123_456_789)), "0.000123457");
         assert_eq!(json(Number::significant(123_456_789.0)), "123457000");
     }

@@ -133,7 +133,7 @@ impl<'a> Filling<'a> {
             return;
         }
         self.seen += 1;
-        if (self.seen - 1) % self.stride != 0 {
+        if !(self.seen - 1).is_multiple_of(self.stride) {
             return;
         }
         let objects = &mut self.plots.objects;
