@@ -10,6 +10,8 @@ use crate::error::FilterError;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cholesky<const N: usize> {
     lower: SMatrix<f64, N, N>,
+    /// One over each diagonal entry: divisions are slow, and every solve needs them.
+    inverse: SVector<f64, N>,
 }
 
 impl<const N: usize> Cholesky<N> {
@@ -20,17 +22,19 @@ impl<const N: usize> Cholesky<N> {
     #[inline]
     pub fn new(matrix: &SMatrix<f64, N, N>, name: &'static str) -> Result<Self, FilterError> {
         let mut lower = SMatrix::<f64, N, N>::zeros();
+        let mut inverses = SVector::<f64, N>::zeros();
         for j in 0..N {
             let mut pivot = matrix[(j, j)];
             for k in 0..j {
                 pivot -= lower[(j, k)] * lower[(j, k)];
             }
-            if !(pivot > 0.0 && pivot.is_finite()) {
+            if !(pivot > 0.0 && pivot < f64::INFINITY) {
                 return Err(FilterError::NotPositiveDefinite { matrix: name, pivot: j, value: pivot });
             }
             let root = pivot.sqrt();
             let inverse = 1.0 / root;
             lower[(j, j)] = root;
+            inverses[j] = inverse;
             for i in j + 1..N {
                 let mut value = matrix[(i, j)];
                 for k in 0..j {
@@ -39,7 +43,7 @@ impl<const N: usize> Cholesky<N> {
                 lower[(i, j)] = value * inverse;
             }
         }
-        Ok(Cholesky { lower })
+        Ok(Cholesky { lower, inverse: inverses })
     }
 
     /// The factor `L` of `L Lᵀ`.
@@ -55,7 +59,7 @@ impl<const N: usize> Cholesky<N> {
             for k in 0..i {
                 out[i] -= self.lower[(i, k)] * out[k];
             }
-            out[i] /= self.lower[(i, i)];
+            out[i] *= self.inverse[i];
         }
         out
     }
@@ -78,9 +82,8 @@ impl<const N: usize> Cholesky<N> {
                     out[(r, j)] -= factor * out[(r, k)];
                 }
             }
-            let inverse = 1.0 / self.lower[(j, j)];
             for r in 0..R {
-                out[(r, j)] *= inverse;
+                out[(r, j)] *= self.inverse[j];
             }
         }
         for j in (0..N).rev() {
@@ -90,9 +93,8 @@ impl<const N: usize> Cholesky<N> {
                     out[(r, j)] -= factor * out[(r, k)];
                 }
             }
-            let inverse = 1.0 / self.lower[(j, j)];
             for r in 0..R {
-                out[(r, j)] *= inverse;
+                out[(r, j)] *= self.inverse[j];
             }
         }
         out
@@ -162,16 +164,34 @@ pub(crate) fn settle<const N: usize>(
     name: &'static str,
 ) -> Result<(), FilterError> {
     symmetrise(matrix);
+    if is_definite(matrix) {
+        return Ok(());
+    }
     match Cholesky::new(matrix, name) {
         Ok(_) => Ok(()),
         Err(error) => repair(matrix, name, error),
     }
 }
 
-/// Whether the lower triangle of `matrix` is that of a positive definite one.
+/// Whether the lower triangle of `matrix` is that of a matrix that is positive definite beyond rounding, by elimination
+/// without roots. Then [`Cholesky::new`] succeeds.
 #[inline]
 pub(crate) fn is_definite<const N: usize>(matrix: &SMatrix<f64, N, N>) -> bool {
-    Cholesky::new(matrix, "").is_ok()
+    let mut rest = *matrix;
+    let mut definite = true;
+    for j in 0..N {
+        let pivot = rest[(j, j)];
+        // A pivot of a negative diagonal entry is itself negative, so the bound must not be.
+        definite &= pivot > N as f64 * FLOOR * matrix[(j, j)].abs() && pivot < f64::INFINITY;
+        let inverse = 1.0 / pivot;
+        for i in j + 1..N {
+            let share = rest[(i, j)] * inverse;
+            for k in j + 1..i + 1 {
+                rest[(i, k)] -= share * rest[(k, j)];
+            }
+        }
+    }
+    definite
 }
 
 /// Replaces both triangles by their mean.
@@ -215,8 +235,9 @@ fn repair<const N: usize>(
     for _ in 0..8 {
         eigen.eigenvalues.apply(|value| *value = value.max(floor));
         let whole = eigen.recompose();
-        let lifted =
-            SMatrix::<f64, N, N>::from_fn(|i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]) * scale[i] * scale[j]);
+        let lifted = SMatrix::<f64, N, N>::from_fn(|i, j| {
+            0.5 * (whole[(i, j)] + whole[(j, i)]) * (scale[i] * scale[j])
+        });
         if Cholesky::new(&lifted, name).is_ok() {
             *matrix = lifted;
             return Ok(());
