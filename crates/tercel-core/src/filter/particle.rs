@@ -254,7 +254,7 @@ impl<T, S, const M: usize> Particle<T, S, M> {
         for ((weight, state), ln_weight) in belief.weighted().zip(&belief.weights) {
             let residual = residual_of(state);
             let ln = ln_weight + factor.ln_density(factor.mahalanobis(&residual));
-            if !(ln < f64::INFINITY) {
+            if ln.is_nan() || ln == f64::INFINITY {
                 return Err(FilterError::NotFinite { what: "innovation" });
             }
             if ln > top {
