@@ -1,7 +1,7 @@
 //! Time of one step (predict and update) of each filter: `cargo bench -p tercel-core --bench filters`.
 
 use divan::{Bencher, black_box};
-use tercel_core::filter::{Extended, Filter, Imm, Kalman, Transition, Unscented};
+use tercel_core::filter::{Extended, Filter, Imm, Kalman, Particle, Transition, Unscented};
 use tercel_core::motion::{ConstantVelocity, CoordinatedTurn, Turn};
 use tercel_core::sensor::{Measurement, Position, RangeBearing};
 
@@ -71,4 +71,10 @@ fn imm_of_three_in_continuous_time(bencher: Bencher) {
     let modes = [0.0, 0.1, -0.1].map(|rate| Kalman::new(Turn::new(rate, 0.5), radar()));
     let imm = Imm::new(modes, Transition::sticky(0.95).per(1.0)).unwrap();
     steps::<4, _>(bencher, imm, [100.0, 50.0]);
+}
+
+#[divan::bench]
+fn particle_1000(bencher: Bencher) {
+    let filter = Particle::new(ConstantVelocity::new(0.5), radar(), 1000, 1).unwrap();
+    steps::<4, _>(bencher, filter, [100.0, 50.0]);
 }

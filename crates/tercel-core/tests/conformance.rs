@@ -6,7 +6,9 @@ mod polar;
 use tercel_core::belief::Gaussian;
 use tercel_core::conformance;
 use tercel_core::conformance::{Expectations, Problem, positions};
-use tercel_core::filter::{Extended, Filter, Imm, Kalman, Padded, SigmaPoints, Transition, Unscented};
+use tercel_core::filter::{
+    Extended, Filter, Imm, Kalman, Padded, Particle, SigmaPoints, Transition, Unscented,
+};
 use tercel_core::motion::{ConstantAcceleration, ConstantVelocity, Turn};
 use tercel_core::sensor::{Measurement, Position};
 
@@ -74,3 +76,34 @@ conformance!(
 );
 conformance!(extended_filter_of_range_and_bearing, polar::Polar(polar::extended));
 conformance!(unscented_filter_of_range_and_bearing, polar::Polar(polar::unscented));
+fn smoothed(problem: &Problem, count: usize, seed: u64) -> Particle<ConstantVelocity, Position<2>> {
+    let filter = Particle::new(problem.motion(), problem.sensor(), count, seed).unwrap();
+    filter.with_smoothing(0.35).unwrap()
+}
+
+/// Without smoothing few particles survive the first updates of a vague birth, and the filter is too sure of itself.
+const PLAIN: Expectations = Expectations { kalman: Some(1.0), consistent: false, ..Expectations::sampled() };
+
+conformance!(
+    smoothed_particle_filter,
+    positions::<4, _, _>(Expectations::sampled(), |p| smoothed(p, 6000, 1))
+);
+conformance!(
+    particle_filter,
+    positions::<4, _, _>(PLAIN, |p| Particle::new(p.motion(), p.sensor(), 3000, 1).unwrap())
+);
+conformance!(
+    imm_with_particles,
+    positions::<4, _, _>(Expectations::sampled(), |p| {
+        Imm::new([1, 2].map(|seed| smoothed(p, 4000, seed)), Transition::sticky(0.9)).unwrap()
+    })
+);
+
+#[test]
+fn the_bounds_of_the_suite_are_those_of_the_chi_square_distribution() {
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+    for (dof, tail, normal) in [(800.0, 0.005, -2.575_829_3), (800.0, 0.995, 2.575_829_3)] {
+        let exact = ChiSquared::new(dof).unwrap().inverse_cdf(tail);
+        assert!((conformance::chi_square(dof, normal) / exact - 1.0).abs() < 1e-4);
+    }
+}

@@ -157,17 +157,17 @@ impl Pipeline {
     }
 }
 
-/// Teaches the clutter map of a sensor with the detections that no confirmed track explains.
+/// Teaches the clutter map of a sensor with its detections, each in the measure in which no track explains it.
 fn learn(station: &mut Station, outcome: &Outcome) {
     let detection = station.detection();
     let Clutter::Map(map) = &mut station.clutter else { return };
-    let confirmed = |id: u64| {
+    let doubt = |id: u64| {
         let row = outcome.rows.binary_search_by_key(&id, |row| row.track);
-        row.is_ok_and(|row| matches!(outcome.rows[row].status, Status::Confirmed | Status::Coasted))
+        row.map_or(1.0, |row| 1.0 - outcome.rows[row].existence)
     };
     let unexplained = outcome.uses.iter().filter_map(|(place, used)| match used {
-        Use::Updated(id) if confirmed(*id) => None,
-        _ => Some(((*place)?, 1.0)),
+        Use::Updated(id) => Some(((*place)?, doubt(*id))),
+        Use::Started(_) | Use::Clutter => Some(((*place)?, 1.0)),
     });
     map.learn(unexplained, &detection);
 }

@@ -48,7 +48,7 @@ pub use behaviour::{
     objects_are_independent, the_reach_covers_the_measurements, the_same_steps_give_the_same_belief,
 };
 pub use numbers::{
-    beliefs_merge_to_their_moments, covariances_stay_positive_definite, equals_the_kalman_filter,
+    beliefs_merge_to_their_moments, chi_square, covariances_stay_positive_definite, equals_the_kalman_filter,
     errors_match_the_covariance, predictions_compose,
 };
 
@@ -96,7 +96,8 @@ pub struct Expectations {
     pub composes: Option<f64>,
     /// The moments of a merged belief, and those after `set_state`: largest difference, in standard deviations.
     pub moments: Option<f64>,
-    /// Covariances stay positive definite when noises and time steps span twelve orders of magnitude.
+    /// Covariances stay positive definite over 10,000 steps when noises span twelve orders of magnitude and time steps six.
+    /// Without it, over 500 steps of ordinary size.
     pub extremes: bool,
 }
 
@@ -115,7 +116,7 @@ impl Expectations {
     /// Of a filter that approximates by samples: the same within the scatter of some thousand, but at ordinary noises.
     pub const fn sampled() -> Self {
         Expectations {
-            kalman: Some(0.15),
+            kalman: Some(0.35),
             consistent: true,
             composes: Some(0.15),
             moments: Some(1e-6),

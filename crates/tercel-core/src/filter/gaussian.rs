@@ -4,7 +4,7 @@ use std::borrow::Borrow;
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use crate::belief::Gaussian;
+use crate::belief::{Gaussian, positive};
 use crate::sensor::Sensor;
 
 /// The methods of [`Filter`](super::Filter) that follow from a Gaussian belief and a field `sensor` of `$m` components.
@@ -72,6 +72,11 @@ pub(super) fn moments<const N: usize, G: Borrow<Gaussian<N>>>(
             merged.merge(total, part.borrow(), weight);
         }
         total += weight;
+    }
+    // Means that lie far apart can hide everything else from a double. What is not finite stays so, for the next update
+    // to report.
+    if !positive::is_definite(&merged.covariance) {
+        let _ = positive::settle(&mut merged.covariance, "covariance of a mixture");
     }
     merged
 }

@@ -77,7 +77,7 @@ where
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         let comparison = Comparison::new(&self.sensor, belief, measurement)?;
-        *belief = comparison.posterior(belief)?;
+        comparison.condition(belief)?;
         Ok(comparison.innovation)
     }
 

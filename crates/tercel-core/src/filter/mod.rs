@@ -6,6 +6,7 @@
 //! | [`Extended`] | Gaussian | smooth motion and sensor: first order |
 //! | [`Unscented`] | Gaussian | bent motion and sensor: second order, no Jacobians |
 //! | [`Imm`] | one belief and one probability per mode | motion that changes between models |
+//! | [`Particle`] | weighted states | any motion, any sensor |
 //! | [`Padded`] | Gaussian | a model with a smaller state beside one with a larger |
 
 mod correction;
@@ -16,6 +17,7 @@ mod imm;
 mod innovation;
 mod kalman;
 mod padded;
+mod particle;
 mod sigma;
 mod transition;
 mod unscented;
@@ -31,6 +33,7 @@ pub use imm::{Imm, ImmBelief};
 pub use innovation::Innovation;
 pub use kalman::Kalman;
 pub use padded::Padded;
+pub use particle::{Particle, Particles};
 pub use sigma::SigmaPoints;
 pub use transition::Transition;
 pub use unscented::Unscented;

@@ -86,14 +86,18 @@ impl<const N: usize> Motion<N> for ConstantVelocity {
         let axes = N / 2;
         let (pp, pv, vv) = self.noise.variances(dt);
         let mut p = belief.covariance;
-        for column in 0..N {
-            for i in 0..axes {
-                p[(i, column)] += dt * p[(i + axes, column)];
+        // Slices of whole columns, which the compiler turns into vector instructions.
+        let columns = &mut p.data.0;
+        for column in columns.iter_mut() {
+            let (positions, velocities) = column.split_at_mut(axes);
+            for (position, velocity) in positions.iter_mut().zip(velocities) {
+                *position += dt * *velocity;
             }
         }
-        for i in 0..axes {
-            for row in 0..N {
-                p[(row, i)] += dt * p[(row, i + axes)];
+        let (positions, velocities) = columns.split_at_mut(axes);
+        for (position, velocity) in positions.iter_mut().zip(velocities) {
+            for (to, from) in position.iter_mut().zip(velocity) {
+                *to += dt * *from;
             }
         }
         for i in 0..axes {

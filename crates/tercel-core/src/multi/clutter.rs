@@ -58,10 +58,11 @@ impl Clutter {
 ///
 /// ## Definition
 /// The plane is cut into square cells. Each cell keeps the mean number of measurements per scan that no track explains, as an
-/// exponential average over the last `memory` scans in which the sensor could see the cell:
+/// exponential average over about the last `memory` scans in which the sensor could see the cell:
 /// ```text
-/// rate ← rate + (count - rate) / min(scans in view, memory)        intensity = background + rate / cell²
+/// rate ← rate + (count - rate) / memory        intensity = background + rate / cell²
 /// ```
+/// Every cell starts at zero, so that one detection of an object that passes by leaves hardly a trace.
 /// A measurement counts in its cell and, by bilinear weights, in the three nearest others, so that the map has no edges.
 ///
 /// ## Use it when
@@ -69,24 +70,19 @@ impl Clutter {
 /// the tracker did not explain: see [`learn`](ClutterMap::learn).
 ///
 /// ## Reference
-/// The classical clutter map of radar practice (Musicki and Evans (2004) discuss it for tracking); the exponential average
-/// with a growing horizon is ours.
+/// The classical clutter map of radar practice; Musicki and Evans (2004) discuss it for tracking.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClutterMap {
     cell: f64,
     background: f64,
     memory: f64,
     cells: BTreeMap<[i64; 2], Cell>,
-    /// Scans learned from.
-    scans: u64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Cell {
     /// Mean measurements per scan in view.
     rate: f64,
-    /// Scans in view, for the horizon of the mean.
-    scans: f64,
     /// Weight that the current scan has put here.
     count: f64,
 }
@@ -103,7 +99,6 @@ impl ClutterMap {
             background: FilterError::positive("clutter background", background)?,
             memory: FilterError::positive("clutter map memory", memory)?.max(1.0),
             cells: BTreeMap::new(),
-            scans: 0,
         })
     }
 
@@ -120,16 +115,12 @@ impl ClutterMap {
     /// Takes in a scan: the place of each measurement and the probability (0 to 1) that it was clutter. Cells that
     /// `detection` says the sensor cannot see keep what they know.
     pub fn learn(&mut self, unexplained: impl Iterator<Item = (Vector2<f64>, f64)>, detection: &Detection) {
-        self.scans += 1;
         for (place, probability) in unexplained {
             if !(place.x.is_finite() && place.y.is_finite()) {
                 continue;
             }
             for (cell, weight) in self.corners(&place) {
-                // A cell seen for the first time was empty in all scans before.
-                let seen = (self.scans - 1) as f64;
-                let entry = self.cells.entry(cell).or_insert(Cell { rate: 0.0, scans: seen, count: 0.0 });
-                entry.count += weight * probability;
+                self.cells.entry(cell).or_default().count += weight * probability;
             }
         }
         let (width, memory) = (self.cell, self.memory);
@@ -138,8 +129,7 @@ impl ClutterMap {
             if cell.count == 0.0 && detection.probability(Some(&centre)) == 0.0 {
                 return true;
             }
-            cell.scans += 1.0;
-            cell.rate += (cell.count - cell.rate) / cell.scans.min(memory);
+            cell.rate += (cell.count - cell.rate) / memory;
             cell.count = 0.0;
             // Forgotten cells would only grow the map.
             cell.rate > 1e-6
@@ -169,9 +159,9 @@ mod tests {
 
     #[test]
     fn a_quay_that_always_answers_becomes_clutter_and_open_water_does_not() {
-        let mut map = ClutterMap::new(10.0, 1e-6, 50.0).unwrap();
+        let mut map = ClutterMap::new(10.0, 1e-6, 20.0).unwrap();
         let everywhere = Detection::uniform(0.9).unwrap();
-        for _ in 0..100 {
+        for _ in 0..200 {
             map.learn([(vector![100.0, 50.0], 1.0)].into_iter(), &everywhere);
         }
         assert!((map.intensity(&vector![100.0, 50.0]) - (1e-6 + 0.01)).abs() < 1e-3);
@@ -188,7 +178,7 @@ mod tests {
         let everywhere = Detection::uniform(0.9).unwrap();
         map.learn([(vector![3.3, -8.1], 1.0), (vector![40.0, 2.0], 0.5)].into_iter(), &everywhere);
         let mass: f64 = map.cells.values().map(|cell| cell.rate).sum();
-        assert!((mass - 1.5).abs() < 1e-12);
+        assert!((mass * 10.0 - 1.5).abs() < 1e-12);
     }
 
     #[test]

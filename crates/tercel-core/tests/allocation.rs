@@ -1,0 +1,79 @@
+//! No filter allocates memory in a step once it has warmed up.
+
+use allocation_counter::measure;
+use tercel_core::belief::Gaussian;
+use tercel_core::filter::{Extended, Filter, Imm, Kalman, Padded, Particle, Transition, Unscented};
+use tercel_core::motion::{ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Turn};
+use tercel_core::sensor::{Measurement, Position, RangeBearing};
+
+/// Allocations in 100 steps after ten, and in the comparison and the state of each.
+fn allocations<const N: usize, F>(filter: &F, seen: [f64; 2]) -> u64
+where
+    F: Filter<N, Measurement = Measurement<2>>,
+{
+    let seen: Measurement<2> = seen.into();
+    let mut belief = filter.birth(&seen).unwrap();
+    let mut step = || {
+        filter.predict(&mut belief, 1.0);
+        filter.innovation(&belief, &seen).unwrap();
+        filter.update(&mut belief, &seen).unwrap();
+        filter.reach(&belief);
+        filter.state(&belief)
+    };
+    (0..10).for_each(|_| {
+        step();
+    });
+    measure(|| (0..100).for_each(|_| assert!(step().mean[0].is_finite()))).count_total
+}
+
+fn radar() -> Position<2> {
+    Position::new(5.0).unwrap()
+}
+
+fn polar() -> RangeBearing {
+    RangeBearing::new(5.0, 0.01).unwrap()
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(measure(|| drop(std::hint::black_box(vec![1_u8]))).count_total, 1);
+}
+
+#[test]
+fn filters_with_one_model_do_not_allocate() {
+    let straight = ConstantVelocity::new(0.5);
+    assert_eq!(allocations::<4, _>(&Kalman::new(straight, radar()), [100.0, 50.0]), 0);
+    assert_eq!(allocations::<4, _>(&Extended::new(straight, polar()), [1000.0, 0.5]), 0);
+    assert_eq!(
+        allocations::<5, _>(&Unscented::new(CoordinatedTurn::new(0.5, 1e-4), polar()), [1000.0, 0.5]),
+        0
+    );
+    let padded = Padded::<_, 4>::new(Kalman::new(straight, radar()), 2.0).unwrap();
+    assert_eq!(allocations::<6, _>(&padded, [100.0, 50.0]), 0);
+}
+
+#[test]
+fn interacting_models_do_not_allocate() {
+    let modes = [0.0, 0.1, -0.1].map(|rate| Kalman::new(Turn::new(rate, 0.5), radar()));
+    for transition in [Transition::sticky(0.9), Transition::sticky(0.9).per(3.0)] {
+        let imm = Imm::new(modes, transition).unwrap();
+        assert_eq!(allocations::<4, _>(&imm, [100.0, 50.0]), 0);
+    }
+    type Boxed = Box<dyn Filter<6, Belief = Gaussian<6>, Measurement = Measurement<2>>>;
+    let boxes: [Boxed; 2] = [
+        Box::new(Padded::<_, 4>::new(Kalman::new(ConstantVelocity::new(0.5), radar()), 2.0).unwrap()),
+        Box::new(Unscented::new(ConstantAcceleration::new(0.5), radar())),
+    ];
+    let imm = Imm::new(boxes, Transition::sticky(0.9)).unwrap();
+    assert_eq!(allocations::<6, _>(&imm, [100.0, 50.0]), 0);
+}
+
+#[test]
+fn particles_do_not_allocate_even_when_they_are_resampled() {
+    let straight = ConstantVelocity::new(0.5);
+    let filter = Particle::new(straight, radar(), 200, 1).unwrap().with_threshold(1.0).unwrap();
+    assert_eq!(allocations::<4, _>(&filter, [100.0, 50.0]), 0);
+    let modes = [1, 2].map(|seed| Particle::new(straight, radar(), 200, seed).unwrap());
+    let imm = Imm::new(modes, Transition::sticky(0.9)).unwrap();
+    assert_eq!(allocations::<4, _>(&imm, [100.0, 50.0]), 0);
+}
