@@ -86,10 +86,10 @@ pub enum DataError {
         help: String,
     },
     /// A column that is there twice, or whose name is almost a known one.
-    #[error("{file}: column `{column}` {problem}")]
+    #[error("{place}: column `{column}` {problem}")]
     Column {
-        /// The file.
-        file: Arc<str>,
+        /// Where: the file, or a line of a stream.
+        place: Place,
         /// Name of the column.
         column: String,
         /// What is wrong with it.
@@ -112,7 +112,7 @@ pub enum DataError {
         help: String,
     },
     /// The description of the file (schema version, kind of table, labels) does not fit.
-    #[error("{file}: the description of the table says {problem}")]
+    #[error("{file}: in the description of the table, {problem}")]
     Metadata {
         /// The file.
         file: Arc<str>,

@@ -40,7 +40,7 @@ mod write;
 pub use column::Angles;
 pub use error::{DataError, Place, Spot};
 pub use format::Format;
-pub use import::{ImportOptions, Imported, Source, import};
+pub use import::{ImportOptions, Imported, LeftOut, Source, import};
 pub use metadata::SCHEMA_VERSION;
 pub use options::ReadOptions;
 pub use output::AtomicFile;

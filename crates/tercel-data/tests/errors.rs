@@ -180,7 +180,7 @@ fn parquet_files() {
     assert!(cut.starts_with("radar.parquet: this is not a whole Parquet file: "), "{cut}");
     let tracks = read_tracks_from(bytes.as_slice(), Format::Parquet, "radar.parquet", &options);
     insta::assert_snapshot!(told(&tracks.unwrap_err()), @r"
-    radar.parquet: the description of the table says that this is a table of `detections`; expected `tracks`
+    radar.parquet: in the description of the table, the table is `detections`; expected `tracks`
       help: give the tracks file here
     ");
 }

@@ -171,7 +171,7 @@ impl<W: Write + Send> SheetWriter<W> {
         let mut names = std::collections::HashSet::new();
         if let Some(twice) = columns.iter().find(|column| !names.insert(column.name.as_ref())) {
             return Err(DataError::Column {
-                file: Arc::clone(file),
+                place: Place::whole(file),
                 column: twice.name.to_string(),
                 problem: "would be there twice",
                 help: "give components and modes of the state names of their own".to_owned(),

@@ -84,7 +84,7 @@ fn append(
     file: &Arc<str>,
 ) -> Result<(), DataError> {
     let wrong_type = || DataError::Column {
-        file: Arc::clone(file),
+        place: Place::whole(file),
         column: column.name.to_string(),
         problem: "has another type",
         help: format!("it is {}; expected {}", cells.data_type(), column.expected()),
