@@ -96,3 +96,17 @@ fn trajectory_gospa_10_against_30(bencher: Bencher, steps: usize) {
         .counter(ItemsCount::new(steps))
         .bench(|| metric.score(black_box(&truth), black_box(&tracks)).map(|score| score.total));
 }
+
+/// Tracks that have nothing to do with the objects but meet them all the time: the worst case for switches. Cut-off 60 m.
+#[divan::bench(args = [100, 500], sample_count = 10)]
+fn trajectory_gospa_10_against_30_strangers(bencher: Bencher, steps: usize) {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let mut walks = |count: usize| -> Vec<Trajectory<2>> {
+        (0..count).map(|_| Trajectory::new(0, walk(steps, &mut random))).collect()
+    };
+    let (truth, tracks) = (walks(10), walks(30));
+    let Ok(metric) = TrajectoryGospa::new(60.0, 1.0, 40.0) else { return };
+    bencher
+        .counter(ItemsCount::new(steps))
+        .bench(|| metric.score(black_box(&truth), black_box(&tracks)).map(|score| score.total));
+}

@@ -10,9 +10,9 @@ use crate::error::FilterError;
 /// ## Definition
 /// With the origin at latitude `φ`, longitude `λ` and Earth-centred position `o`:
 /// ```text
-///                | -sin λ          cos λ         0     |
-/// enu = R (x-o), R = | -sin φ cos λ   -sin φ sin λ   cos φ |
-///                |  cos φ cos λ    cos φ sin λ   sin φ |
+///                      | -sin λ          cos λ         0     |
+/// enu = R (x - o), R = | -sin φ cos λ   -sin φ sin λ   cos φ |
+///                      |  cos φ cos λ    cos φ sin λ   sin φ |
 /// ```
 /// The frame is exact and does not bend with the Earth: at 100 km from the origin the ground lies 780 m below its plane.
 /// Velocities rotate as positions do, because the frame does not move.

@@ -222,7 +222,7 @@ impl GospaAverage {
     /// Mean of each part, as `p`-th powers; `None` before the first score.
     pub fn parts(&self) -> Option<GospaParts> {
         let share = 1.0 / self.count as f64;
-        (self.count > 0).then(|| GospaParts {
+        (self.count > 0).then_some(GospaParts {
             localisation: self.parts.localisation * share,
             missed: self.parts.missed * share,
             false_alarm: self.parts.false_alarm * share,

@@ -22,6 +22,8 @@ mod ospa;
 mod ospa2;
 mod rmse;
 mod scale;
+#[cfg(test)]
+mod tests;
 mod trajectory;
 mod trajectory_gospa;
 

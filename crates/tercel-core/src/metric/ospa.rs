@@ -19,7 +19,7 @@ use crate::error::FilterError;
 ///
 /// ## Reference
 /// Schuhmacher, Vo and Vo, "A consistent metric for performance evaluation of multi-object filters", IEEE TSP 56(8)
-/// (2008), eqs. 3 and 4. Agrees with Stone Soup 1.9.1 to 1e-9.
+/// (2008). Agrees with Stone Soup 1.9.1 to 1e-9.
 ///
 /// ```
 /// use tercel_core::metric::Ospa;

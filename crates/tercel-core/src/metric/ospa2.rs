@@ -24,7 +24,7 @@ use crate::error::FilterError;
 ///
 /// ## Reference
 /// Beard, Vo and Vo, "OSPA(2): Using the OSPA metric to evaluate multi-target tracking performance", ICCAIS 2017, and "A
-/// solution for large-scale multi-object tracking", IEEE TSP 68 (2020), section V. Choice: equal weights for all steps, and
+/// solution for large-scale multi-object tracking", IEEE TSP 68 (2020). Choice: equal weights for all steps, and
 /// order 1 within a trajectory.
 ///
 /// ```

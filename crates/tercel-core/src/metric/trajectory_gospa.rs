@@ -36,21 +36,23 @@ use crate::error::FilterError;
 /// 1. Objects and tracks that never come within `c` are told apart; each cluster is solved alone.
 /// 2. If the cheapest paths do not collide they are the answer.
 /// 3. Otherwise prices climb, from those of the assignments of the single steps, until the bounds meet.
-/// 4. If they do not meet within a hundred climbs, a linear programme over the paths seen so far finds better prices and,
-///    where the optimum is fractional, the weights; paths are added until none is missing (Dantzig and Wolfe's column
-///    generation).
+/// 4. If they do not meet within 400 climbs, a linear programme over the paths seen so far finds better prices and, where
+///    the optimum is fractional, the weights; paths are added until none is missing (Dantzig and Wolfe's column generation).
 ///
-/// The difference of the bounds is part of the result: it is at most 1e-10 of `cᵖ/2` for each point, save where 300 rounds
-/// of step 4 are not enough. So no general solver is needed, and the time follows the collisions, not the size.
+/// So no general solver is needed, and the time follows the collisions, not the size. The difference of the bounds is
+/// part of the result, as [`gap`](TrajectoryGospaScore::gap): it is at most 1e-10 of `cᵖ/2` for each step of each
+/// trajectory, or more where 100 rounds of step 4 do not suffice. Ten objects against thirty tracks over 500 steps take
+/// about 1 ms when the tracks follow the objects, and about a second when the two have nothing to do with each other and
+/// meet all the time; single cases of the latter kind took 10 s.
 ///
 /// ## Use it when
 /// whole tracks are judged: broken tracks, swaps, late starts. Choose `γ` by how many metres of error a switch is worth.
 ///
 /// ## Reference
 /// García-Fernández, Rahmathullah and Svensson, "A metric on the space of finite sets of trajectories for evaluation of
-/// multi-target tracking algorithms", IEEE TSP 68 (2020): the linear programming metric, eqs. 21 to 24; when the weights
-/// are whole numbers, as almost always, it equals the multi-dimensional assignment metric of eq. 9. Decomposition as in
-/// section IV.C. Not divided by the number of steps.
+/// multi-target tracking algorithms", IEEE TSP 68 (2020): the linear programming metric. When the weights are whole
+/// numbers, as almost always, it equals the multi-dimensional assignment metric of the same paper. Parts as there; not divided
+/// by the number of steps.
 ///
 /// ```
 /// use tercel_core::metric::{Trajectory, TrajectoryGospa};

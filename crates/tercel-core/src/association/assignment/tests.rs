@@ -5,7 +5,7 @@ use super::*;
 
 const FORBIDDEN: f64 = f64::INFINITY;
 
-/// Cheapest (number of unassigned rows of infinite miss cost, cost) over all assignments of the rows from `row` on.
+/// Lowest cost over all assignments of the rows from `row` on.
 fn brute_force(costs: &[f64], columns: usize, misses: &[f64], row: usize, taken: u32) -> f64 {
     if row == misses.len() {
         return 0.0;

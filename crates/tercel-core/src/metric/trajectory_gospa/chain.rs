@@ -40,6 +40,12 @@ impl Prices {
     pub(super) fn sum(&self) -> f64 {
         self.values.iter().sum()
     }
+
+    /// What a path pays.
+    pub(super) fn along(&self, path: &Path) -> f64 {
+        let uses = path.iter().enumerate().filter(|(_, track)| **track != NONE);
+        uses.map(|(step, track)| self.values[self.place(*track, step)]).sum()
+    }
 }
 
 /// Memory of [`Chain::best`], to be used again.

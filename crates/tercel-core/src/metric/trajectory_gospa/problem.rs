@@ -8,8 +8,10 @@ use super::relaxation::{Relaxation, Solution};
 use crate::metric::scale::{Scale, euclidean};
 use crate::metric::trajectory::Trajectory;
 
-/// Bounds have met when they differ by this share of `cᵖ/2` for each point.
+/// Bounds have met when they differ by this share of `cᵖ/2` for each step of each trajectory.
 const TOLERANCE: f64 = 1e-10;
+/// Climbs of the prices before the linear programme is called.
+const CLIMBS: usize = 400;
 
 /// What is gained at each step when a track stands for an object: `cᵖ - d(x_i, y_j)ᵖ`.
 struct Pair {
@@ -113,7 +115,8 @@ impl Problem {
             chains[place(&objects, pair.object)].gains.push((track, gains));
         }
         let tolerance = TOLERANCE * 0.5 * self.highest * (steps * (objects.len() + tracks.len())) as f64;
-        let relaxation = Relaxation { chains: &chains, tracks: tracks.len(), steps, tolerance };
+        let relaxation =
+            Relaxation { chains: &chains, tracks: tracks.len(), steps, tolerance, climbs: CLIMBS };
         let solution = relaxation.solve();
         solved.gap += solution.gap;
         let first = start - self.steps.start;

@@ -6,10 +6,8 @@ use super::chain::{Chain, Memory, NONE, Path, Prices};
 use super::simplex::{Optimum, Programme};
 use crate::association::AssignmentSolver;
 
-/// Climbs of the prices before the linear programme is called.
-const CLIMBS: usize = 100;
 /// Rounds of the linear programme.
-const ROUNDS: usize = 300;
+const ROUNDS: usize = 100;
 
 /// A path of one object and the share that it has.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +31,8 @@ pub(super) struct Relaxation<'a> {
     pub(super) steps: usize,
     /// Bounds that are this close have met.
     pub(super) tolerance: f64,
+    /// Climbs of the prices before the linear programme is called.
+    pub(super) climbs: usize,
 }
 
 /// What some prices prove, and the paths that they lead to.
@@ -186,9 +186,7 @@ impl Relaxation<'_> {
 
     fn sweep(&self, prices: &Prices, order: &[usize], paths: &mut [Path], memory: &mut Memory) {
         let mut blocked = prices.clone();
-        for object in 0..paths.len() {
-            block(&mut blocked, prices, &paths[object], true);
-        }
+        paths.iter().for_each(|path| block(&mut blocked, prices, path, true));
         for &object in order {
             block(&mut blocked, prices, &paths[object], false);
             paths[object] = self.chains[object].best(&blocked, memory).1;
@@ -201,7 +199,7 @@ impl Relaxation<'_> {
     fn climb(&self, state: &mut State) {
         let mut prices = state.prices.clone();
         let (mut length, mut idle) = (1.0, 0);
-        for climb in 0..CLIMBS {
+        for climb in 0..self.climbs {
             if self.met(state) {
                 return;
             }
@@ -235,9 +233,14 @@ impl Relaxation<'_> {
     /// Column generation: the best mixture of the paths seen gives prices, which lead to new paths, until these are no better.
     fn generate(&self, mut state: State) -> Solution {
         let mut mixture = None;
+        self.forget_dear_paths(&mut state);
         for _ in 0..ROUNDS {
             let groups = self.groups(&state.pool);
             let optimum = self.mix(&groups, &state.pool);
+            // What rounding spoiled proves nothing; the paths and the bound so far still hold.
+            if !self.is_mixture(&optimum, &groups, &state.pool) {
+                break;
+            }
             let exact = self.spread(&groups, &optimum, Some(&state.prices));
             let even = self.spread(&groups, &optimum, None);
             let mut between = exact.clone();
@@ -261,6 +264,36 @@ impl Relaxation<'_> {
             }
             _ => state.whole(),
         }
+    }
+
+    /// Keeps the paths that may matter: under the best prices they cost no more above the cheapest of their object than the bounds
+    /// are apart. A path forgotten in error is found again.
+    fn forget_dear_paths(&self, state: &mut State) {
+        let limit = 2.0 * (state.cost - state.bound);
+        let cheapest: Vec<f64> =
+            self.chains.iter().map(|chain| chain.best(&state.prices, &mut state.memory).0).collect();
+        let mut pool = Pool { paths: Vec::new(), known: HashMap::new() };
+        for (number, (object, path)) in state.pool.paths.iter().enumerate() {
+            let cost = self.chains[*object].cost(path) + state.prices.along(path);
+            if number < self.chains.len()
+                || cost - cheapest[*object] <= limit
+                || *path == state.paths[*object]
+            {
+                pool.add(*object, path);
+            }
+        }
+        state.pool = pool;
+    }
+
+    /// Whether the shares of every object sum to 1 and no group is taken more than once.
+    fn is_mixture(&self, optimum: &Optimum, groups: &[(Vec<usize>, Vec<usize>)], pool: &Pool) -> bool {
+        let mut sums = vec![0.0; self.chains.len()];
+        for (share, (object, _)) in optimum.shares.iter().zip(&pool.paths) {
+            sums[*object] += share;
+        }
+        let taken = |users: &[usize]| users.iter().map(|user| optimum.shares[*user]).sum::<f64>();
+        sums.iter().all(|sum| (sum - 1.0).abs() < 1e-9)
+            && groups.iter().all(|(users, _)| taken(users) < 1.0 + 1e-9)
     }
 
     /// Uses of a track at a step that the same paths make, as places of their prices: one condition stands for all. Uses by one

@@ -90,8 +90,9 @@ impl Tableau {
         // The bound stands far above what programmes of this kind take, and keeps rounding from holding up the caller,
         // who checks what comes back.
         for _ in 0..50 * (self.rows() + self.width) {
-            let Some(column) = self.entering(idle > 20) else { return };
-            let Some(row) = self.leaving(column) else { return };
+            let stuck = idle > 50;
+            let Some(column) = self.entering(stuck) else { return };
+            let Some(row) = self.leaving(column, stuck) else { return };
             let gains = self.cells[row * self.width + self.width - 1] > ROUNDING;
             idle = if gains { 0 } else { idle + 1 };
             self.pivot(row, column);
@@ -108,23 +109,18 @@ impl Tableau {
         (*steepest.1 < -ROUNDING).then_some(steepest.0)
     }
 
-    /// The row that limits the entering column; of several, that of the lowest basic column.
-    fn leaving(&self, column: usize) -> Option<usize> {
-        let mut best: Option<(f64, usize)> = None;
-        for row in 0..self.rows() {
-            let cells = &self.cells[row * self.width..(row + 1) * self.width];
-            if cells[column] < 1e-9 {
-                continue;
-            }
-            let ratio = cells[self.width - 1] / cells[column];
-            let better = best.is_none_or(|(limit, held)| {
-                ratio < limit - ROUNDING || (ratio < limit + ROUNDING && self.basis[row] < self.basis[held])
-            });
-            if better {
-                best = Some((ratio, row));
-            }
+    /// The row that limits the entering column. Of several, that of the largest pivot, which keeps rounding small, or that of
+    /// the lowest basic column (Bland's rule).
+    fn leaving(&self, column: usize, first: bool) -> Option<usize> {
+        let cell = |row: usize, column: usize| self.cells[row * self.width + column];
+        let ratio = |row: usize| cell(row, self.width - 1) / cell(row, column);
+        let rows = || (0..self.rows()).filter(|row| cell(*row, column) > 1e-7);
+        let limit = rows().map(ratio).min_by(f64::total_cmp)? + ROUNDING;
+        let limiting = rows().filter(|row| ratio(*row) <= limit);
+        if first {
+            return limiting.min_by_key(|row| self.basis[*row]);
         }
-        best.map(|(_, row)| row)
+        limiting.max_by(|a, b| cell(*a, column).total_cmp(&cell(*b, column)))
     }
 
     fn pivot(&mut self, row: usize, column: usize) {
@@ -137,7 +133,7 @@ impl Tableau {
             if other == row {
                 cells.copy_from_slice(&pivot);
             } else if factor != 0.0 {
-                cells.iter_mut().zip(&pivot).for_each(|(cell, x)| *cell -= factor * x);
+                cells.iter_mut().zip(&pivot).for_each(|(cell, x)| *cell = settled(*cell - factor * x));
                 cells[column] = 0.0;
             }
         }
@@ -152,4 +148,11 @@ impl Tableau {
         let cells = &rows[row * width..(row + 1) * width];
         bottom.iter_mut().zip(cells).for_each(|(cost, x)| *cost -= factor * x);
     }
+}
+
+/// A cell that differs from zero by rounding only is zero: cells are near whole numbers or small fractions, and what is left of
+/// a cancellation must not become a pivot later.
+#[inline]
+fn settled(cell: f64) -> f64 {
+    if cell.abs() < 1e-13 { 0.0 } else { cell }
 }
