@@ -1,5 +1,8 @@
 //! The Autoferry importer on the bundled recordings.
 
+// The exception for tests covers only the test functions themselves, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 use std::f64::consts::PI;
 use std::path::PathBuf;
 

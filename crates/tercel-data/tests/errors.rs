@@ -1,5 +1,8 @@
 //! What the errors say: where, what, what was expected, and what helps.
 
+// The exception for tests covers only the test functions themselves, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 use std::fmt::Write as _;
 
 use tercel_data::ndjson::Scans;

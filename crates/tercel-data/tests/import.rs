@@ -1,5 +1,8 @@
 //! The importers for aircraft and ships, on reports made up for the purpose.
 
+// The exception for tests covers only the test functions themselves, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 use std::path::Path;
 
 use tercel_core::geo::{Geodetic, LocalFrame};

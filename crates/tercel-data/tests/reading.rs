@@ -1,5 +1,8 @@
 //! Files as people and other programs write them.
 
+// The exception for tests covers only the test functions themselves, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 use std::io::Write;
 
 use tercel_data::ndjson::Scans;
