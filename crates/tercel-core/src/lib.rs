@@ -21,6 +21,8 @@
 
 pub mod association;
 pub mod belief;
+#[cfg(feature = "conformance")]
+pub mod conformance;
 pub mod error;
 pub mod filter;
 pub mod geo;

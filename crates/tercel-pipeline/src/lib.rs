@@ -1,1 +1,39 @@
-//! Placeholder.
+//! A tracker described by a TOML file, for scans whose kind is known only at run time.
+//!
+//! [`Config`] says which sensors there are, how objects move, which filter estimates them and which tracker finds them.
+//! [`Pipeline`] is what it describes: scans of the canonical tables in, rows of the track table out.
+//!
+//! ```
+//! use tercel_pipeline::{Config, Pipeline};
+//! use tercel_data::table::{Detection, Noise, Observation, Scan};
+//!
+//! let config = Config::parse(
+//!     r#"
+//!     [motion]
+//!     constant_velocity = { acceleration_density = 0.5, speed = 15.0 }
+//!
+//!     [sensors.radar]
+//!     measures = { position = { deviation = 5.0 } }
+//!     clutter = { uniform = { density = 1e-6 } }
+//!     "#,
+//! )?;
+//! let mut pipeline = Pipeline::new(&config)?;
+//! let observation = Observation::Position { x: 100.0, y: 50.0, z: None };
+//! let detection = Detection { id: 1, observation, noise: Noise::default(), truth: None };
+//! let scan = Scan { time: 0.0, sensor: "radar".into(), position: None, detections: vec![detection] };
+//! let rows = pipeline.push(scan)?;
+//! assert_eq!(rows[0].state, [100.0, 50.0, 0.0, 0.0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod config;
+mod engine;
+mod error;
+mod estimator;
+mod pipeline;
+mod reorder;
+mod sensors;
+
+pub use config::Config;
+pub use error::PipelineError;
+pub use pipeline::{Pipeline, Summary};

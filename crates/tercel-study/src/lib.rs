@@ -1,1 +1,5 @@
-//! Placeholder.
+//! Studies and reports: run trackers over scenarios, score them, draw the result.
+
+pub mod evaluate;
+pub mod report;
+mod timeline;

@@ -100,7 +100,7 @@ impl<const N: usize> Gaussian<N> {
         self.mean += difference * share;
         self.covariance = self.covariance * (1.0 - share)
             + other.covariance * share
-            + (difference * (share * (1.0 - share))) * difference.transpose();
+            + difference * difference.transpose() * (share * (1.0 - share));
     }
 
     /// The first `K` components, as the belief of a smaller state.

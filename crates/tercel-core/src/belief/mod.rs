@@ -1,7 +1,7 @@
 //! What is known about one object: values without behaviour of their own.
 
 mod gaussian;
-mod positive;
+pub(crate) mod positive;
 
 pub use gaussian::Gaussian;
 pub use positive::Cholesky;

@@ -125,6 +125,33 @@ const ROUNDING: f64 = 1e-6;
 /// Smallest eigenvalue kept, relative to the largest one: a few units in the last place.
 const FLOOR: f64 = 4.0 * f64::EPSILON;
 
+/// A lower triangular `L` with `L Lᵀ = matrix` for a matrix that may be singular, such as the covariance of a noise
+/// that enters in fewer directions than the state has components. Pivots that rounding explains count as zero, and
+/// numbers that are not finite stay so.
+#[inline]
+pub(crate) fn root<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+    let mut lower = SMatrix::<f64, N, N>::zeros();
+    for j in 0..N {
+        let mut pivot = matrix[(j, j)];
+        for k in 0..j {
+            pivot -= lower[(j, k)] * lower[(j, k)];
+        }
+        if pivot <= N as f64 * FLOOR * matrix[(j, j)] {
+            continue;
+        }
+        let root = pivot.sqrt();
+        lower[(j, j)] = root;
+        for i in j + 1..N {
+            let mut value = matrix[(i, j)];
+            for k in 0..j {
+                value -= lower[(i, k)] * lower[(j, k)];
+            }
+            lower[(i, j)] = value / root;
+        }
+    }
+    lower
+}
+
 /// Makes `matrix` symmetric, and positive definite when only rounding has made it otherwise.
 ///
 /// # Errors
@@ -139,6 +166,12 @@ pub(crate) fn settle<const N: usize>(
         Ok(_) => Ok(()),
         Err(error) => repair(matrix, name, error),
     }
+}
+
+/// Whether the lower triangle of `matrix` is that of a positive definite one.
+#[inline]
+pub(crate) fn is_definite<const N: usize>(matrix: &SMatrix<f64, N, N>) -> bool {
+    Cholesky::new(matrix, "").is_ok()
 }
 
 /// Replaces both triangles by their mean.
@@ -215,6 +248,16 @@ mod tests {
         let v = vector![1.0, -2.0, 0.5];
         assert!((factor.mahalanobis(&v) - (v.transpose() * inverse * v)[0]).abs() < 1e-14);
         assert!((factor.ln_determinant() - a.determinant().ln()).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_singular_matrix_has_a_root() {
+        let (p, v) = (0.5, 1.0);
+        let rank_one = matrix![p * p, p * v, 0.0; p * v, v * v, 0.0; 0.0, 0.0, 0.0];
+        let lower = root(&rank_one);
+        assert!((lower * lower.transpose() - rank_one).norm() < 1e-15);
+        assert_eq!(lower.column(1).norm() + lower.column(2).norm(), 0.0);
+        assert!(root(&matrix![f64::NAN, 0.0; 0.0, 1.0])[(0, 0)].is_nan());
     }
 
     #[test]

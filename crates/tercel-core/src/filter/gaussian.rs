@@ -1,6 +1,8 @@
 //! What every filter with a Gaussian belief answers alike.
 
-use nalgebra::{SMatrix, Vector2};
+use std::borrow::Borrow;
+
+use nalgebra::{SMatrix, SVector, Vector2};
 
 use crate::belief::Gaussian;
 use crate::sensor::Sensor;
@@ -54,4 +56,22 @@ pub(super) fn reach<const N: usize, const M: usize>(
     let place = sensor.place(&sensor.expected(&belief.mean).into())?;
     let position = SMatrix::from_fn(|i, j| belief.covariance[(i, j)]);
     Some((place, position + spread))
+}
+
+/// The Gaussian with the moments of a mixture, relative to the sum of its weights. An empty one has no moments: zeros.
+#[inline]
+pub(super) fn moments<const N: usize, G: Borrow<Gaussian<N>>>(
+    parts: impl Iterator<Item = (f64, G)>,
+) -> Gaussian<N> {
+    let mut merged = Gaussian { mean: SVector::zeros(), covariance: SMatrix::zeros() };
+    let mut total = 0.0;
+    for (weight, part) in parts {
+        if total == 0.0 {
+            merged = *part.borrow();
+        } else {
+            merged.merge(total, part.borrow(), weight);
+        }
+        total += weight;
+    }
+    merged
 }

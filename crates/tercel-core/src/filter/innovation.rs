@@ -38,3 +38,53 @@ impl Innovation {
         usize::from(self.dof)
     }
 }
+
+/// Gathers the innovations of several modes into the one of their mixture.
+#[derive(Default)]
+pub(super) struct Blend {
+    /// Likelihoods are held relative to the largest so far, so that none of the relevant ones underflows.
+    top: Option<f64>,
+    likelihood: f64,
+    nis: f64,
+    probability: f64,
+    residual: [f64; CAPACITY],
+    dof: u8,
+}
+
+impl Blend {
+    /// Adds a mode of this probability before the measurement. Returns the logarithm of its weight after it, `ln cΛ`.
+    pub fn add(&mut self, probability: f64, innovation: &Innovation) -> f64 {
+        let weight = probability.ln() + innovation.log_likelihood;
+        // A likelihood that overflowed or is not a number counts as zero.
+        let weight = if weight < f64::INFINITY { weight } else { f64::NEG_INFINITY };
+        let top = self.top.map_or(weight, |top| top.max(weight));
+        if top > f64::NEG_INFINITY {
+            let shrink = self.top.map_or(0.0, |old| (old - top).exp());
+            let share = (weight - top).exp();
+            self.likelihood = self.likelihood * shrink + share;
+            self.nis = self.nis * shrink + share * innovation.nis;
+        }
+        self.top = Some(top);
+        self.probability += probability;
+        for (sum, component) in self.residual.iter_mut().zip(innovation.residual()) {
+            *sum += probability * component;
+        }
+        self.dof = self.dof.max(innovation.dof);
+        weight
+    }
+
+    /// The innovation of the mixture, unless no mode was added.
+    pub fn finish(self) -> Option<Innovation> {
+        let top = self.top?;
+        if top == f64::NEG_INFINITY {
+            let residual = self.residual.map(|sum| sum / self.probability);
+            return Some(Innovation { log_likelihood: top, nis: f64::INFINITY, residual, dof: self.dof });
+        }
+        Some(Innovation {
+            log_likelihood: top + self.likelihood.ln(),
+            nis: self.nis / self.likelihood,
+            residual: self.residual.map(|sum| sum / self.probability),
+            dof: self.dof,
+        })
+    }
+}

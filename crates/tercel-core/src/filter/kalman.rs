@@ -1,6 +1,6 @@
 //! The Kalman filter.
 
-use super::correction::Comparison;
+use super::correction::{Comparison, predicted};
 use super::gaussian::gaussian_belief;
 use super::{Filter, Innovation};
 use crate::belief::Gaussian;
@@ -67,7 +67,7 @@ where
 
     #[inline]
     fn predict(&self, belief: &mut Gaussian<N>, dt: f64) {
-        *belief = self.motion.predict(belief, dt);
+        *belief = predicted(&self.motion, belief, dt);
     }
 
     #[inline]

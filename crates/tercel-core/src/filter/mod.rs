@@ -4,13 +4,21 @@
 //! |---|---|---|
 //! | [`Kalman`] | Gaussian | linear motion and sensor: exact |
 //! | [`Extended`] | Gaussian | smooth motion and sensor: first order |
+//! | [`Unscented`] | Gaussian | bent motion and sensor: second order, no Jacobians |
+//! | [`Imm`] | one belief and one probability per mode | motion that changes between models |
+//! | [`Padded`] | Gaussian | a model with a smaller state beside one with a larger |
 
 mod correction;
 mod estimate;
 mod extended;
 mod gaussian;
+mod imm;
 mod innovation;
 mod kalman;
+mod padded;
+mod sigma;
+mod transition;
+mod unscented;
 
 use nalgebra::{SMatrix, Vector2};
 
@@ -19,8 +27,13 @@ use crate::error::FilterError;
 
 pub use estimate::Estimate;
 pub use extended::Extended;
+pub use imm::{Imm, ImmBelief};
 pub use innovation::Innovation;
 pub use kalman::Kalman;
+pub use padded::Padded;
+pub use sigma::SigmaPoints;
+pub use transition::Transition;
+pub use unscented::Unscented;
 
 /// A recursion over a belief about one object, whose state has `N` components.
 ///
@@ -115,7 +128,7 @@ pub trait Filter<const N: usize> {
     fn area(&self, measurement: &Self::Measurement) -> f64;
 
     /// Moves many beliefs forward. Filters that work faster on batches override it.
-    fn predict_all(&self, beliefs: &mut [Self::Belief], dt: f64) {
+    fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
         for belief in beliefs {
             self.predict(belief, dt);
         }
@@ -172,7 +185,7 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
     fn area(&self, measurement: &Self::Measurement) -> f64 {
         (**self).area(measurement)
     }
-    fn predict_all(&self, beliefs: &mut [Self::Belief], dt: f64) {
+    fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
         (**self).predict_all(beliefs, dt);
     }
 }

@@ -64,6 +64,27 @@ pub trait Motion<const N: usize> {
 /// the Kalman filter exact.
 pub trait LinearMotion<const N: usize>: Motion<N> {}
 
+/// A borrowed model is a model.
+impl<const N: usize, T: Motion<N> + ?Sized> Motion<N> for &T {
+    fn transition(&self, state: &SVector<f64, N>, dt: f64) -> SVector<f64, N> {
+        (**self).transition(state, dt)
+    }
+    fn jacobian(&self, state: &SVector<f64, N>, dt: f64) -> SMatrix<f64, N, N> {
+        (**self).jacobian(state, dt)
+    }
+    fn noise(&self, state: &SVector<f64, N>, dt: f64) -> SMatrix<f64, N, N> {
+        (**self).noise(state, dt)
+    }
+    fn prior(&self) -> Gaussian<N> {
+        (**self).prior()
+    }
+    fn predict(&self, belief: &Gaussian<N>, dt: f64) -> Gaussian<N> {
+        (**self).predict(belief, dt)
+    }
+}
+
+impl<const N: usize, T: LinearMotion<N> + ?Sized> LinearMotion<N> for &T {}
+
 /// How accelerations that the model does not know enter a state of positions and velocities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AccelerationNoise {

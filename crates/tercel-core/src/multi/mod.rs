@@ -1,1 +1,120 @@
-//! multi
+//! Many objects in clutter: trackers that decide which measurements belong to which object, which objects are new and
+//! which are gone. Every tracker takes every [`Filter`].
+//!
+//! | tracker | associates | for |
+//! |---|---|---|
+//! | [`NearestNeighbour`] | each measurement to at most one track, jointly at the least cost | clear pictures, thousands of objects |
+//! | [`Phd`] | nothing: it estimates the intensity of objects | dense clutter, objects that come and go |
+
+mod clutter;
+mod detection;
+mod error;
+mod management;
+mod nearest_neighbour;
+mod phd;
+mod track;
+
+use nalgebra::{SMatrix, Vector2};
+
+use crate::belief::Gaussian;
+use crate::filter::Filter;
+
+pub use clutter::{Clutter, ClutterMap};
+pub use detection::Detection;
+pub use error::TrackerError;
+pub use management::{Confirmation, Management};
+pub use nearest_neighbour::{NearestNeighbour, NearestNeighbourConfig};
+pub use phd::{Phd, PhdConfig};
+pub use track::{Status, Track, TrackId, Use};
+
+/// What one sensor saw at one time, and how it sees.
+#[derive(Debug, Clone, Copy)]
+pub struct Scan<'a, Z> {
+    /// Seconds, never less than in the scan before.
+    pub time: f64,
+    /// The measurements; none is a scan too.
+    pub measurements: &'a [Z],
+    /// How likely the sensor sees an object.
+    pub detection: &'a Detection,
+    /// How many measurements come from no object.
+    pub clutter: &'a Clutter,
+}
+
+/// A tracker of many objects: measurements in, tracks out, scan by scan.
+///
+/// The filter is passed with each scan, so that scans of different sensors are processed by their own filters, as long as
+/// these share the type of belief.
+pub trait Tracker {
+    /// What is known of one object.
+    type Belief: Clone;
+
+    /// Takes in one scan.
+    ///
+    /// # Errors
+    /// When the scan is older than the one before, or holds a number that is not finite. The tracker is then unchanged.
+    fn step<const N: usize, F>(
+        &mut self,
+        filter: &F,
+        scan: &Scan<'_, F::Measurement>,
+    ) -> Result<(), TrackerError>
+    where
+        F: Filter<N, Belief = Self::Belief> + ?Sized;
+
+    /// The tracks after the last scan, tentative ones and those deleted in that scan included, by rising number.
+    fn tracks(&self) -> &[Track<Self::Belief>];
+
+    /// What became of each measurement of the last scan.
+    fn uses(&self) -> &[Use];
+
+    /// Time of the last scan, s.
+    fn time(&self) -> Option<f64>;
+}
+
+/// Where each measurement of a scan lies, after checking that it lies somewhere.
+fn places<const N: usize, F: Filter<N> + ?Sized>(
+    filter: &F,
+    scan: &Scan<'_, F::Measurement>,
+) -> Result<Vec<Option<Vector2<f64>>>, TrackerError> {
+    let mut places = Vec::with_capacity(scan.measurements.len());
+    for (number, measurement) in scan.measurements.iter().enumerate() {
+        let place = filter.place(measurement);
+        if place.is_some_and(|place| !(place.x.is_finite() && place.y.is_finite())) {
+            return Err(TrackerError::Measurement { time: scan.time, measurement: number });
+        }
+        places.push(place);
+    }
+    Ok(places)
+}
+
+/// Clutter intensity at a measurement, in the units of the filter's likelihoods.
+fn clutter_at<const N: usize, F: Filter<N> + ?Sized>(
+    filter: &F,
+    scan: &Scan<'_, F::Measurement>,
+    measurement: &F::Measurement,
+) -> f64 {
+    scan.clutter.intensity(filter.place(measurement).as_ref()) * filter.area(measurement)
+}
+
+/// Expected number of new objects behind an unexplained measurement, given the number where clutter has its background
+/// intensity: where the clutter map is dense an unexplained measurement is more clutter and as little new object as anywhere.
+fn birth_weight<const N: usize, F: Filter<N> + ?Sized>(
+    background_weight: f64,
+    filter: &F,
+    scan: &Scan<'_, F::Measurement>,
+    measurement: &F::Measurement,
+) -> f64 {
+    let background = scan.clutter.background();
+    let intensity = scan.clutter.intensity(filter.place(measurement).as_ref());
+    let births = background_weight * background;
+    births / (births + (1.0 - background_weight) * intensity)
+}
+
+/// Position part of a state in the plane, if it has two positions.
+fn plane<const N: usize>(state: &Gaussian<N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+    (N >= 2).then(|| {
+        (Vector2::new(state.mean[0], state.mean[1]), SMatrix::from_fn(|i, j| state.covariance[(i, j)]))
+    })
+}
+
+#[cfg(test)]
+mod tests;

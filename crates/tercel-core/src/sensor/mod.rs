@@ -144,6 +144,42 @@ pub trait LinearSensor<const N: usize, const M: usize>: Sensor<N, M> {}
 impl<const N: usize, const M: usize> LinearSensor<N, M> for Position<M> {}
 impl<const N: usize> LinearSensor<N, 2> for ConvertedPolar {}
 
+/// A borrowed sensor is a sensor.
+impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for &S {
+    fn expected(&self, state: &SVector<f64, N>) -> SVector<f64, M> {
+        (**self).expected(state)
+    }
+    fn jacobian(&self, state: &SVector<f64, N>) -> SMatrix<f64, M, N> {
+        (**self).jacobian(state)
+    }
+    fn noise(&self, expected: &SVector<f64, M>) -> SMatrix<f64, M, M> {
+        (**self).noise(expected)
+    }
+    fn read(&self, measurement: &Measurement<M>) -> Reading<M> {
+        (**self).read(measurement)
+    }
+    fn periodic(&self) -> [bool; M] {
+        (**self).periodic()
+    }
+    fn difference(&self, reading: &SVector<f64, M>, expected: &SVector<f64, M>) -> SVector<f64, M> {
+        (**self).difference(reading, expected)
+    }
+    fn birth(&self, measurement: &Measurement<M>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError> {
+        (**self).birth(measurement, prior)
+    }
+    fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {
+        (**self).place(measurement)
+    }
+    fn spread(&self, state: &SVector<f64, N>) -> Option<SMatrix<f64, 2, 2>> {
+        (**self).spread(state)
+    }
+    fn area(&self, measurement: &Measurement<M>) -> f64 {
+        (**self).area(measurement)
+    }
+}
+
+impl<const N: usize, const M: usize, S: LinearSensor<N, M> + ?Sized> LinearSensor<N, M> for &S {}
+
 /// The angle between -π and π that differs from `angle` by whole turns.
 #[inline]
 pub fn wrapped(angle: f64) -> f64 {

@@ -9,7 +9,7 @@ use crate::error::FilterError;
 
 /// Measures range, bearing and range rate (Doppler) from where it stands. The bearing is periodic.
 ///
-/// The state needs velocities: `x, y, vx, vy, ...`.
+/// The state has velocities: `x, y, vx, vy, ...`; one without stands still.
 ///
 /// ## Model
 /// With `d = p - s` and `u = v - w` for a sensor at `s` that moves with velocity `w`:
@@ -66,8 +66,8 @@ impl RangeBearingRate {
 
     /// From the sensor to the object: offset and relative velocity.
     fn relative<const N: usize>(&self, state: &SVector<f64, N>) -> (Vector2<f64>, Vector2<f64>) {
-        const { assert!(N >= 4, "a range rate needs a velocity in the state") };
-        let velocity = vector![state[2] - self.velocity.x, state[3] - self.velocity.y];
+        let [vx, vy] = if N >= 4 { [state[2], state[3]] } else { [0.0, 0.0] };
+        let velocity = vector![vx, vy] - self.velocity;
         (offset(state, &self.polar.position()), velocity)
     }
 
@@ -97,7 +97,9 @@ impl<const N: usize> Sensor<N, 3> for RangeBearingRate {
             jacobian[(0, i)] = along[i];
             jacobian[(1, i)] = turn[i];
             jacobian[(2, i)] = swing[i];
-            jacobian[(2, i + 2)] = along[i];
+            if N >= 4 {
+                jacobian[(2, i + 2)] = along[i];
+            }
         }
         jacobian
     }

@@ -1,5 +1,7 @@
 //! What a tracker made of the detections.
 
+pub use tercel_core::multi::Status;
+
 use super::Origin;
 
 /// The tracks of a recording: one row per reported track and scan.
@@ -39,29 +41,4 @@ pub struct Track {
     pub extent: Option<[f64; 3]>,
     /// The detection that updated the track in this scan, if one did.
     pub detection: Option<u64>,
-}
-
-/// Where a track is in its life.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Status {
-    /// Seen, but not yet believed.
-    Tentative,
-    /// Believed, and seen in this scan (or outside this sensor's view).
-    Confirmed,
-    /// Believed, but missed in this scan.
-    Coasted,
-    /// Given up in this scan: the last row of its track.
-    Deleted,
-}
-
-impl Status {
-    /// The name used in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Status::Tentative => "tentative",
-            Status::Confirmed => "confirmed",
-            Status::Coasted => "coasted",
-            Status::Deleted => "deleted",
-        }
-    }
 }

@@ -1,0 +1,320 @@
+//! The interacting multiple model filter.
+
+use nalgebra::{SMatrix, Vector2};
+
+use super::gaussian::moments;
+use super::innovation::Blend;
+use super::transition::Chain;
+use super::{Estimate, Filter, Innovation, Transition};
+use crate::belief::Gaussian;
+use crate::error::FilterError;
+
+/// Estimates a state whose motion changes between models, with one filter per model and their probabilities.
+///
+/// ## Recursion
+/// With mode probabilities `μ`, the transition `Π` over the step and the likelihood `Λⱼ` of the innovation of mode `j`:
+/// ```text
+/// predict   cⱼ = Σᵢ μᵢ Πᵢⱼ            mode j starts from the moments of all modes under μᵢ Πᵢⱼ / cⱼ, and predicts
+/// update    μⱼ = cⱼ Λⱼ / Σᵢ cᵢ Λᵢ     each mode updates
+/// ```
+/// The state is the moment match of the modes. [`Innovation::log_likelihood`] is that of the mixture, the residual is the
+/// mean of those of the modes under `c`, and the normalised square their mean under the new `μ`.
+///
+/// Any filter can be a mode: a learned one keeps its memory, because mixing replaces only mean and covariance
+/// ([`set_state`](Filter::set_state)). Filters of different types go in boxes, and a model with a smaller state in
+/// [`Padded`](super::Padded).
+///
+/// A mode whose update fails keeps its belief, gets a vanishing probability and restarts from the others at the next mixing;
+/// the update fails when all modes do. No probability falls below 1e-300, so a mode that was ruled out can return. A
+/// prediction of `dt = 0` is no step: nothing mixes.
+///
+/// ## Use it when
+/// the models are known and few enough to cover the motion: turns at some rates beside straight flight, calm beside
+/// manoeuvring. A rate between the models is followed by mixing them; one outside makes the filter lag.
+///
+/// ## Reference
+/// Blom and Bar-Shalom (1988), eqs. 3 to 9. Deviations: likelihoods in the log domain; the transition may scale with `dt`.
+///
+/// Validated against FilterPy 1.4.5 over 30 steps of two modes: probabilities, states and covariances agree to 1e-9.
+///
+/// ```
+/// use tercel_core::{filter::{Filter, Imm, Kalman, Transition}, motion::Turn, sensor::Position};
+///
+/// let radar = Position::<2>::new(5.0)?;
+/// let modes = [0.0, 0.1, -0.1].map(|rate| Kalman::new(Turn::new(rate, 0.1), radar));
+/// let imm = Imm::new(modes, Transition::sticky(0.95).per(1.0))?;
+/// let mut belief = imm.birth(&[1000.0, 0.0].into())?;
+/// for second in 1..=30 {
+///     let (sine, cosine) = (0.1 * second as f64).sin_cos();
+///     imm.predict(&mut belief, 1.0);
+///     imm.update(&mut belief, &[1000.0 * cosine, 1000.0 * sine].into())?;
+/// }
+/// assert!(imm.mode_probabilities(&belief)[1] > 0.9); // turns to the left
+/// # Ok::<(), tercel_core::error::FilterError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Imm<F> {
+    filters: Vec<F>,
+    chain: Chain,
+    initial: Vec<f64>,
+}
+
+/// What an [`Imm`] filter knows of one object: a belief and a probability for each mode.
+#[derive(Debug, PartialEq)]
+pub struct ImmBelief<B, const N: usize> {
+    modes: Vec<Mode<B, N>>,
+    probabilities: Vec<f64>,
+    /// Room for the transition over a step that had to be computed.
+    transition: Vec<f64>,
+}
+
+/// The belief of one mode, with room for a step: beliefs change in place and no step allocates.
+#[derive(Debug, Clone, PartialEq)]
+struct Mode<B, const N: usize> {
+    belief: B,
+    state: Gaussian<N>,
+    weight: f64,
+}
+
+/// Smallest probability of a mode.
+const FLOOR: f64 = 1e-300;
+
+impl<F> Imm<F> {
+    /// Filters, one per mode, and how the object changes between them. All modes are equally probable at birth.
+    ///
+    /// # Errors
+    /// When there is no filter, or the transition is not one between this many modes.
+    pub fn new(filters: impl IntoIterator<Item = F>, transition: Transition) -> Result<Self, FilterError> {
+        let filters: Vec<F> = filters.into_iter().collect();
+        if filters.is_empty() {
+            let (parameter, expected) = ("number of modes", "must be at least 1");
+            return Err(FilterError::Parameter { parameter, value: 0.0, expected });
+        }
+        let chain = transition.chain(filters.len())?;
+        let initial = vec![1.0 / filters.len() as f64; filters.len()];
+        Ok(Imm { filters, chain, initial })
+    }
+
+    /// Sets the mode probabilities of a new object. They are normalised.
+    ///
+    /// # Errors
+    /// When there is not one per mode, one is not a probability, or all are zero.
+    pub fn with_initial(mut self, probabilities: &[f64]) -> Result<Self, FilterError> {
+        for &value in probabilities {
+            FilterError::probability("initial mode probability", value)?;
+        }
+        let sum: f64 = probabilities.iter().sum();
+        FilterError::positive("sum of the initial mode probabilities", sum)?;
+        if probabilities.len() != self.filters.len() {
+            let (parameter, expected) = ("number of initial mode probabilities", "must be one per mode");
+            return Err(FilterError::Parameter { parameter, value: probabilities.len() as f64, expected });
+        }
+        self.initial = probabilities.iter().map(|p| (p / sum).max(FLOOR)).collect();
+        Ok(self)
+    }
+
+    /// The filters, one per mode.
+    pub fn filters(&self) -> &[F] {
+        &self.filters
+    }
+
+    /// Probability of each mode, in the order of the filters.
+    pub fn mode_probabilities<'a, B, const N: usize>(&self, belief: &'a ImmBelief<B, N>) -> &'a [f64] {
+        &belief.probabilities
+    }
+}
+
+impl<B, const N: usize> ImmBelief<B, N> {
+    /// Beliefs of the modes, in the order of the filters.
+    pub fn modes(&self) -> impl ExactSizeIterator<Item = &B> {
+        self.modes.iter().map(|mode| &mode.belief)
+    }
+}
+
+impl<B: Clone, const N: usize> Clone for ImmBelief<B, N> {
+    fn clone(&self) -> Self {
+        ImmBelief {
+            modes: self.modes.clone(),
+            probabilities: self.probabilities.clone(),
+            transition: Vec::new(),
+        }
+    }
+
+    // Trackers copy beliefs into buffers of the last scan; their room is used again.
+    fn clone_from(&mut self, source: &Self) {
+        self.probabilities.clone_from(&source.probabilities);
+        self.modes.truncate(source.modes.len());
+        let (head, tail) = source.modes.split_at(self.modes.len());
+        for (mode, other) in self.modes.iter_mut().zip(head) {
+            mode.belief.clone_from(&other.belief);
+        }
+        self.modes.extend_from_slice(tail);
+    }
+}
+
+impl<F> Imm<F> {
+    /// Moves every mode to the moments of those that may have led to it, and the probabilities over the step.
+    fn mix<const N: usize>(&self, belief: &mut ImmBelief<F::Belief, N>, dt: f64)
+    where
+        F: Filter<N>,
+    {
+        let ImmBelief { modes, probabilities, transition } = belief;
+        let count = self.filters.len();
+        let transition = self.chain.over(dt, transition);
+        for (mode, filter) in modes.iter_mut().zip(&self.filters) {
+            mode.state = filter.state(&mode.belief);
+        }
+        for (j, filter) in self.filters.iter().enumerate() {
+            let flow = |i: usize| probabilities[i] * transition[i * count + j];
+            let total: f64 = (0..count).map(flow).sum();
+            modes[j].weight = total.max(FLOOR);
+            // Without anything from other modes, mixing would only round.
+            if total > flow(j) {
+                let parts = (0..count).map(|i| (flow(i) / total, &modes[i].state));
+                let mixed = moments(parts.filter(|(weight, _)| *weight > 0.0));
+                filter.set_state(&mut modes[j].belief, &mixed);
+            }
+        }
+        for (probability, mode) in probabilities.iter_mut().zip(modes) {
+            *probability = mode.weight;
+        }
+    }
+}
+
+impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
+    type Belief = ImmBelief<F::Belief, N>;
+    type Measurement = F::Measurement;
+
+    fn birth(&self, measurement: &F::Measurement) -> Result<Self::Belief, FilterError> {
+        let modes: Result<_, FilterError> = self
+            .filters
+            .iter()
+            .map(|filter| {
+                let belief = filter.birth(measurement)?;
+                let state = filter.state(&belief);
+                Ok(Mode { belief, state, weight: 0.0 })
+            })
+            .collect();
+        Ok(ImmBelief { modes: modes?, probabilities: self.initial.clone(), transition: Vec::new() })
+    }
+
+    fn predict(&self, belief: &mut Self::Belief, dt: f64) {
+        if dt != 0.0 && self.filters.len() > 1 {
+            self.mix(belief, dt);
+        }
+        for (mode, filter) in belief.modes.iter_mut().zip(&self.filters) {
+            filter.predict(&mut mode.belief, dt);
+        }
+    }
+
+    fn update(
+        &self,
+        belief: &mut Self::Belief,
+        measurement: &F::Measurement,
+    ) -> Result<Innovation, FilterError> {
+        let mut blend = Blend::default();
+        let mut failure = None;
+        for ((mode, filter), probability) in
+            belief.modes.iter_mut().zip(&self.filters).zip(&belief.probabilities)
+        {
+            mode.weight = match filter.update(&mut mode.belief, measurement) {
+                Ok(innovation) => blend.add(*probability, &innovation),
+                Err(error) => {
+                    failure.get_or_insert(error);
+                    f64::NEG_INFINITY
+                }
+            };
+        }
+        let innovation = blend.finish().ok_or_else(|| nothing_updated(failure))?;
+        // A measurement that no mode can explain says nothing about which one it is.
+        if innovation.log_likelihood.is_finite() {
+            for (probability, mode) in belief.probabilities.iter_mut().zip(&belief.modes) {
+                *probability = (mode.weight - innovation.log_likelihood).exp().max(FLOOR);
+            }
+        }
+        Ok(innovation)
+    }
+
+    fn innovation(
+        &self,
+        belief: &Self::Belief,
+        measurement: &F::Measurement,
+    ) -> Result<Innovation, FilterError> {
+        let mut blend = Blend::default();
+        let mut failure = None;
+        for ((mode, filter), probability) in belief.modes.iter().zip(&self.filters).zip(&belief.probabilities)
+        {
+            match filter.innovation(&mode.belief, measurement) {
+                Ok(innovation) => {
+                    blend.add(*probability, &innovation);
+                }
+                Err(error) => {
+                    failure.get_or_insert(error);
+                }
+            }
+        }
+        blend.finish().ok_or_else(|| nothing_updated(failure))
+    }
+
+    fn state(&self, belief: &Self::Belief) -> Gaussian<N> {
+        let states = belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
+        moments(states.map(|((mode, filter), probability)| (*probability, filter.state(&mode.belief))))
+    }
+
+    /// Every mode gets this state; the probabilities stay.
+    fn set_state(&self, belief: &mut Self::Belief, state: &Gaussian<N>) {
+        for (mode, filter) in belief.modes.iter_mut().zip(&self.filters) {
+            filter.set_state(&mut mode.belief, state);
+        }
+    }
+
+    /// Mode by mode, each with its share of the probabilities.
+    fn merge(&self, belief: &mut Self::Belief, weight: f64, other: &Self::Belief, other_weight: f64) {
+        let total = weight + other_weight;
+        if total <= 0.0 {
+            return;
+        }
+        for (j, filter) in self.filters.iter().enumerate() {
+            let (mine, theirs) = (weight * belief.probabilities[j], other_weight * other.probabilities[j]);
+            filter.merge(&mut belief.modes[j].belief, mine, &other.modes[j].belief, theirs);
+            belief.probabilities[j] = ((mine + theirs) / total).max(FLOOR);
+        }
+    }
+
+    fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
+        let state = self.state(belief);
+        Estimate { mean: state.mean, covariance: state.covariance, modes: belief.probabilities.clone() }
+    }
+
+    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+        let mut merged: Option<Gaussian<2>> = None;
+        let mut weight = 0.0;
+        for ((mode, filter), probability) in belief.modes.iter().zip(&self.filters).zip(&belief.probabilities)
+        {
+            let (mean, covariance) = filter.reach(&mode.belief)?;
+            let part = Gaussian { mean, covariance };
+            match &mut merged {
+                Some(merged) => merged.merge(weight, &part, *probability),
+                None => merged = Some(part),
+            }
+            weight += probability;
+        }
+        merged.map(|merged| (merged.mean, merged.covariance))
+    }
+
+    fn place(&self, measurement: &F::Measurement) -> Option<Vector2<f64>> {
+        self.filters.first()?.place(measurement)
+    }
+
+    fn area(&self, measurement: &F::Measurement) -> f64 {
+        self.filters.first().map_or(1.0, |filter| filter.area(measurement))
+    }
+}
+
+/// The error of a step in which no mode could be updated.
+fn nothing_updated(failure: Option<FilterError>) -> FilterError {
+    failure.unwrap_or(FilterError::NotFinite { what: "likelihood of every mode" })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,103 @@
+//! How likely a sensor sees an object.
+
+use nalgebra::Vector2;
+
+use crate::error::FilterError;
+
+/// Probability that a scan holds a measurement of an object that is there.
+///
+/// ```
+/// use tercel_core::multi::Detection;
+/// use nalgebra::vector;
+///
+/// // A lidar that sees well to 60 m and nothing beyond 110 m.
+/// let lidar = Detection::by_range(vec![(60.0, 0.9), (110.0, 0.0)])?.at(vector![10.0, 0.0]);
+/// assert_eq!(lidar.probability(Some(&vector![95.0, 0.0])), 0.45);
+/// assert_eq!(lidar.probability(Some(&vector![500.0, 0.0])), 0.0);
+/// # Ok::<(), tercel_core::error::FilterError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// Ranges (rising) and the probability at each.
+    table: Vec<(f64, f64)>,
+    position: Vector2<f64>,
+}
+
+impl Detection {
+    /// The same probability everywhere.
+    ///
+    /// # Errors
+    /// When it is not between 0 and 1.
+    pub fn uniform(probability: f64) -> Result<Self, FilterError> {
+        Detection::by_range(vec![(0.0, probability)])
+    }
+
+    /// A probability that depends on the distance from the sensor: linear between the entries (range in m, probability) of
+    /// the table, constant before the first and after the last.
+    ///
+    /// # Errors
+    /// When the table is empty, its ranges do not rise, or a probability is not between 0 and 1.
+    pub fn by_range(table: Vec<(f64, f64)>) -> Result<Self, FilterError> {
+        if table.is_empty() {
+            return Err(FilterError::Parameter {
+                parameter: "entries of the detection table",
+                value: 0.0,
+                expected: "must be at least one",
+            });
+        }
+        for &(range, probability) in &table {
+            FilterError::probability("detection probability", probability)?;
+            if !(range >= 0.0 && range.is_finite()) {
+                return Err(FilterError::Parameter {
+                    parameter: "range of the detection table",
+                    value: range,
+                    expected: "must be finite and not negative",
+                });
+            }
+        }
+        match table.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
+            Some(pair) => Err(FilterError::Parameter {
+                parameter: "range of the detection table",
+                value: pair[1].0,
+                expected: "must be above the range before it",
+            }),
+            None => Ok(Detection { table, position: Vector2::zeros() }),
+        }
+    }
+
+    /// Moves the sensor to `position`, m.
+    pub fn at(mut self, position: Vector2<f64>) -> Self {
+        self.position = position;
+        self
+    }
+
+    /// Probability of detecting an object at `place`. Where the place is not known the probability at range zero is taken.
+    pub fn probability(&self, place: Option<&Vector2<f64>>) -> f64 {
+        let (first, last) = (self.table[0], self.table[self.table.len() - 1]);
+        if self.table.len() == 1 {
+            return first.1;
+        }
+        let range = place.map_or(0.0, |place| (place - self.position).norm());
+        match self.table.iter().position(|entry| entry.0 > range) {
+            Some(0) => first.1,
+            None => last.1,
+            Some(after) => {
+                let ((r0, p0), (r1, p1)) = (self.table[after - 1], self.table[after]);
+                p0 + (p1 - p0) * (range - r0) / (r1 - r0)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bad_table_is_refused() {
+        assert!(Detection::by_range(vec![]).is_err());
+        assert!(Detection::by_range(vec![(0.0, 1.2)]).is_err());
+        assert!(Detection::by_range(vec![(10.0, 0.5), (10.0, 0.4)]).is_err());
+        assert!(Detection::by_range(vec![(f64::NAN, 0.5)]).is_err());
+    }
+}

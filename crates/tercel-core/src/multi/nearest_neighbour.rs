@@ -1,0 +1,292 @@
+//! Global nearest neighbour tracker with existence probabilities.
+
+use crate::association::{AssignmentSolver, Gate, PlaceIndex};
+use crate::error::FilterError;
+use crate::filter::Filter;
+
+use super::{
+    Management, Scan, Status, Track, TrackId, Tracker, TrackerError, Use, birth_weight, clutter_at, error,
+    places, plane,
+};
+
+/// Gives each track at most one measurement and each measurement to at most one track, so that the whole scan is explained
+/// at the least cost, and keeps the probability that each track exists.
+///
+/// ## Recursion
+/// For a track that exists with probability `r`, is detected with `p_D` and gives measurement `z` the density `q(z)`, against
+/// clutter of intensity `κ`:
+/// ```text
+/// predict   r⁻ = p_S r
+/// assign    minimise Σ cost:   -ln(r⁻ p_D q(z) / κ(z)) for a pair,   -ln(1 - r⁻ p_D) for a track left alone
+/// paired    r = r⁻ l / (1 - r⁻ + r⁻ l),        l = 1 - p_D + p_D q(z) / κ(z), and the belief is updated by z
+/// missed    r = r⁻ (1 - p_D) / (1 - r⁻ p_D)
+/// ```
+/// A measurement that no track takes starts a tentative one. A track whose belief has come as close to that of a stronger
+/// one as if both were one object is dropped.
+///
+/// ## Use it when
+/// objects are mostly apart against the sensor's accuracy; it is the fastest tracker here, and its decisions are easy to
+/// follow. Where objects stay close for long, or clutter is dense, a tracker that weighs several associations loses fewer
+/// tracks.
+///
+/// ## Reference
+/// Blackman and Popoli (1999), section 6.4; the existence probability after Musicki, Evans and Stankovic (1994) with the
+/// assigned measurement as the only one, and the costs as in the most likely hypothesis of a multi-Bernoulli filter.
+///
+/// ```
+/// use tercel_core::belief::Gaussian;
+/// use tercel_core::filter::Kalman;
+/// use tercel_core::motion::ConstantVelocity;
+/// use tercel_core::multi::{Clutter, Detection, NearestNeighbour, NearestNeighbourConfig, Scan, Status, Tracker};
+/// use tercel_core::sensor::{Measurement, Position};
+///
+/// let filter = Kalman::new(ConstantVelocity::new(0.1), Position::new(5.0)?);
+/// let (detection, clutter) = (Detection::uniform(0.9)?, Clutter::per_scan(5.0, 1e6)?);
+/// let mut tracker = NearestNeighbour::<Gaussian<4>>::new(NearestNeighbourConfig::default())?;
+/// for second in 0..10 {
+///     let time = f64::from(second);
+///     let measurements = [Measurement::from([10.0 * time, 0.0])];
+///     tracker.step(&filter, &Scan { time, measurements: &measurements, detection: &detection, clutter: &clutter })?;
+/// }
+/// assert_eq!(tracker.tracks()[0].status, Status::Confirmed);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct NearestNeighbour<B> {
+    config: NearestNeighbourConfig,
+    tracks: Vec<Track<B>>,
+    uses: Vec<Use>,
+    next: TrackId,
+    time: Option<f64>,
+    scratch: Scratch,
+}
+
+/// The settings of a [`NearestNeighbour`] tracker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestNeighbourConfig {
+    /// Measurements outside the gate of a track are not paired with it.
+    pub gate: Gate,
+    /// Probability that an object survives one second.
+    pub survival: f64,
+    /// Probability that an unassigned measurement comes from a new object, where clutter has its background intensity.
+    pub birth: f64,
+    /// Of two tracks closer than this squared Mahalanobis distance the one less sure to exist is dropped. Zero keeps both.
+    pub merge: f64,
+    /// When tracks are confirmed and deleted.
+    pub management: Management,
+}
+
+impl Default for NearestNeighbourConfig {
+    fn default() -> Self {
+        NearestNeighbourConfig {
+            gate: Gate::default(),
+            survival: 0.99,
+            birth: 0.1,
+            merge: 0.5,
+            management: Management::default(),
+        }
+    }
+}
+
+/// Buffers that keep their memory from scan to scan.
+#[derive(Debug, Clone, Default)]
+struct Scratch {
+    index: PlaceIndex,
+    near: Vec<usize>,
+    solver: AssignmentSolver,
+    /// (track, measurement, cost) of the pairs in a gate.
+    pairs: Vec<(usize, usize, f64)>,
+    /// Cost of leaving each track alone.
+    misses: Vec<f64>,
+    /// Detection probability of each track.
+    detection: Vec<f64>,
+    columns: Vec<Option<usize>>,
+}
+
+impl<B> NearestNeighbour<B> {
+    /// A tracker without objects.
+    ///
+    /// # Errors
+    /// When a probability is outside its range.
+    pub fn new(config: NearestNeighbourConfig) -> Result<Self, FilterError> {
+        FilterError::probability("survival probability", config.survival)?;
+        FilterError::probability("birth probability", config.birth)?;
+        Ok(NearestNeighbour {
+            config,
+            tracks: Vec::new(),
+            uses: Vec::new(),
+            next: 1,
+            time: None,
+            scratch: Scratch::default(),
+        })
+    }
+}
+
+impl<B: Clone> NearestNeighbour<B> {
+    fn predict<const N: usize, F>(&mut self, filter: &F, dt: f64)
+    where
+        F: Filter<N, Belief = B> + ?Sized,
+    {
+        let survival = self.config.survival.powf(dt);
+        let mut beliefs: Vec<&mut B> = Vec::with_capacity(self.tracks.len());
+        for track in &mut self.tracks {
+            track.existence *= survival;
+            beliefs.push(&mut track.belief);
+        }
+        filter.predict_all(&mut beliefs, dt);
+    }
+
+    /// Lists the pairs within the gate and their costs, and assigns.
+    fn assign<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
+    where
+        F: Filter<N, Belief = B> + ?Sized,
+    {
+        let Scratch { index, near, solver, pairs, misses, detection, columns } = &mut self.scratch;
+        (pairs.clear(), misses.clear(), detection.clear());
+        for (row, track) in self.tracks.iter().enumerate() {
+            let reach = filter.reach(&track.belief);
+            let seen = scan.detection.probability(reach.as_ref().map(|(centre, _)| centre));
+            detection.push(seen);
+            misses.push(-(1.0 - track.existence * seen).max(f64::MIN_POSITIVE).ln());
+            match reach {
+                _ if seen == 0.0 => near.clear(),
+                Some((centre, spread)) => index.near(&centre, &spread, self.config.gate.search_limit(), near),
+                None => near.splice(.., 0..scan.measurements.len()).for_each(drop),
+            }
+            for &column in near.iter() {
+                // A pair that cannot be compared numerically is a pair outside the gate.
+                let Ok(innovation) = filter.innovation(&track.belief, &scan.measurements[column]) else {
+                    continue;
+                };
+                let clutter = clutter_at(filter, scan, &scan.measurements[column]);
+                let cost = -(track.existence * seen).ln() - innovation.log_likelihood + clutter.ln();
+                if self.config.gate.contains(&innovation) && cost.is_finite() {
+                    pairs.push((row, column, cost));
+                }
+            }
+        }
+        columns.clear();
+        match solver.solve_sparse(pairs, scan.measurements.len(), misses) {
+            Ok(best) => columns.extend_from_slice(&best.columns),
+            // All costs are finite and every track may stay alone, so there is always an answer.
+            Err(_) => columns.resize(self.tracks.len(), None),
+        }
+    }
+
+    /// Updates the paired tracks, and records the misses of the others.
+    fn update<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
+    where
+        F: Filter<N, Belief = B> + ?Sized,
+    {
+        self.uses.clear();
+        self.uses.resize(scan.measurements.len(), Use::Clutter);
+        for (row, track) in self.tracks.iter_mut().enumerate() {
+            let (seen, r) = (self.scratch.detection[row], track.existence);
+            let number = self.scratch.columns[row];
+            let paired = number.and_then(|number| {
+                let measurement = &scan.measurements[number];
+                let innovation = filter.update(&mut track.belief, measurement).ok()?;
+                Some((number, innovation.log_likelihood.exp() / clutter_at(filter, scan, measurement)))
+            });
+            match paired {
+                Some((number, ratio)) => {
+                    let l = 1.0 - seen + seen * ratio;
+                    // A ratio beyond the range of a double leaves no doubt.
+                    track.existence = if l.is_finite() { r * l / (1.0 - r + r * l) } else { 1.0 };
+                    track.hit(number, scan.time);
+                    self.uses[number] = Use::Updated(track.id);
+                }
+                None if seen > 0.0 => {
+                    track.existence = r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
+                    track.miss();
+                }
+                None => track.unseen(),
+            }
+            self.config.management.judge(track, scan.time);
+        }
+    }
+
+    /// Drops tracks that have become the same as a stronger one.
+    fn merge<const N: usize, F>(&mut self, filter: &F)
+    where
+        F: Filter<N, Belief = B> + ?Sized,
+    {
+        if self.config.merge <= 0.0 {
+            return;
+        }
+        let Scratch { index, near, .. } = &mut self.scratch;
+        let states: Vec<_> = self.tracks.iter().map(|track| plane(&filter.state(&track.belief))).collect();
+        index.build(&states.iter().map(|state| state.map(|state| state.0)).collect::<Vec<_>>());
+        for row in 0..self.tracks.len() {
+            let Some((centre, spread)) = &states[row] else { continue };
+            index.near(centre, spread, self.config.merge, near);
+            for &other in near.iter().filter(|&&other| other != row) {
+                let (track, rival) = (&self.tracks[row], &self.tracks[other]);
+                let alive = track.status != Status::Deleted && rival.status != Status::Deleted;
+                let stronger = (track.confirmed, track.existence, rival.id)
+                    > (rival.confirmed, rival.existence, track.id);
+                let limit = self.config.merge;
+                if alive && stronger && filter.distance(&track.belief, &rival.belief, limit) <= limit {
+                    self.tracks[other].status = Status::Deleted;
+                }
+            }
+        }
+    }
+
+    /// Starts a tentative track at each measurement that no track took.
+    fn birth<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
+    where
+        F: Filter<N, Belief = B> + ?Sized,
+    {
+        for (number, measurement) in scan.measurements.iter().enumerate() {
+            let existence = birth_weight(self.config.birth, filter, scan, measurement);
+            if self.uses[number] != Use::Clutter || existence < self.config.management.min_existence {
+                continue;
+            }
+            // A measurement that cannot say where an object is starts none.
+            let Ok(belief) = filter.birth(measurement) else { continue };
+            let mut track = Track::new(self.next, belief, existence, number, scan.time);
+            self.config.management.judge(&mut track, scan.time);
+            self.uses[number] = Use::Started(track.id);
+            self.next += 1;
+            self.tracks.push(track);
+        }
+    }
+}
+
+impl<B: Clone> Tracker for NearestNeighbour<B> {
+    type Belief = B;
+
+    fn step<const N: usize, F>(
+        &mut self,
+        filter: &F,
+        scan: &Scan<'_, F::Measurement>,
+    ) -> Result<(), TrackerError>
+    where
+        F: Filter<N, Belief = B> + ?Sized,
+    {
+        let dt = error::step(scan.time, self.time)?;
+        let places = places(filter, scan)?;
+        self.tracks.retain(|track| track.status != Status::Deleted);
+        self.scratch.index.build(&places);
+        self.predict(filter, dt);
+        self.assign(filter, scan);
+        self.update(filter, scan);
+        self.merge(filter);
+        self.birth(filter, scan);
+        self.time = Some(scan.time);
+        Ok(())
+    }
+
+    fn tracks(&self) -> &[Track<B>] {
+        &self.tracks
+    }
+
+    fn uses(&self) -> &[Use] {
+        &self.uses
+    }
+
+    fn time(&self) -> Option<f64> {
+        self.time
+    }
+}

@@ -1,0 +1,111 @@
+//! What a tracker reports.
+
+/// Number of a track: unique in the life of its tracker.
+pub type TrackId = u64;
+
+/// One object, as a tracker sees it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track<B> {
+    /// Its number.
+    pub id: TrackId,
+    /// What is known of it.
+    pub belief: B,
+    /// Probability that it exists.
+    pub existence: f64,
+    /// Where it is in its life.
+    pub status: Status,
+    /// The measurement of the last scan that updated it, if one did.
+    pub measurement: Option<usize>,
+    /// Scans that updated it.
+    pub hits: u32,
+    /// Scans in a row that should have seen it and did not.
+    pub misses: u32,
+    /// Time of the scan in which it started, s.
+    pub started: f64,
+    /// Time of the last scan that updated it, s.
+    pub updated: f64,
+    /// Whether each of the last 64 scans in view updated it; the newest in the lowest bit.
+    pub(super) history: u64,
+    /// Scans in view, at most 64.
+    pub(super) seen: u32,
+    pub(super) confirmed: bool,
+}
+
+impl<B> Track<B> {
+    /// A tentative track, just started by a measurement.
+    pub(super) fn new(id: TrackId, belief: B, existence: f64, measurement: usize, time: f64) -> Self {
+        Track {
+            id,
+            belief,
+            existence,
+            status: Status::Tentative,
+            measurement: Some(measurement),
+            hits: 1,
+            misses: 0,
+            started: time,
+            updated: time,
+            history: 1,
+            seen: 1,
+            confirmed: false,
+        }
+    }
+
+    /// Records that the scan at `time` updated the track.
+    pub(super) fn hit(&mut self, measurement: usize, time: f64) {
+        self.measurement = Some(measurement);
+        self.hits = self.hits.saturating_add(1);
+        self.misses = 0;
+        self.updated = time;
+        self.history = self.history << 1 | 1;
+        self.seen = (self.seen + 1).min(64);
+    }
+
+    /// Records that a scan that should have seen the track did not.
+    pub(super) fn miss(&mut self) {
+        self.measurement = None;
+        self.misses = self.misses.saturating_add(1);
+        self.history <<= 1;
+        self.seen = (self.seen + 1).min(64);
+    }
+
+    /// Records a scan that could not have seen the track.
+    pub(super) fn unseen(&mut self) {
+        self.measurement = None;
+    }
+}
+
+/// Where a track is in its life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Status {
+    /// Seen, but not yet believed.
+    Tentative,
+    /// Believed, and seen in the last scan or out of that sensor's view.
+    Confirmed,
+    /// Believed, but missed in the last scan.
+    Coasted,
+    /// Given up in the last scan; it is reported this once.
+    Deleted,
+}
+
+impl Status {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Tentative => "tentative",
+            Status::Confirmed => "confirmed",
+            Status::Coasted => "coasted",
+            Status::Deleted => "deleted",
+        }
+    }
+}
+
+/// What became of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Use {
+    /// It updated this track.
+    Updated(TrackId),
+    /// It started this track.
+    Started(TrackId),
+    /// It was counted as clutter.
+    Clutter,
+}

@@ -1,0 +1,76 @@
+//! Every filter of the crate passes the conformance suite.
+
+#[path = "conformance/polar.rs"]
+mod polar;
+
+use tercel_core::belief::Gaussian;
+use tercel_core::conformance;
+use tercel_core::conformance::{Expectations, Problem, positions};
+use tercel_core::filter::{Extended, Filter, Imm, Kalman, Padded, SigmaPoints, Transition, Unscented};
+use tercel_core::motion::{ConstantAcceleration, ConstantVelocity, Turn};
+use tercel_core::sensor::{Measurement, Position};
+
+type Linear = Kalman<ConstantVelocity, Position<2>>;
+type Boxed<const N: usize> = Box<dyn Filter<N, Belief = Gaussian<N>, Measurement = Measurement<2>>>;
+
+fn kalman(problem: &Problem) -> Linear {
+    Kalman::new(problem.motion(), problem.sensor())
+}
+
+/// Modes that are all the right model, so that the mixture is too.
+fn imm_of_equals(problem: &Problem) -> Imm<Linear> {
+    Imm::new([0; 3].map(|_| kalman(problem)), Transition::sticky(0.9).per(1.0)).unwrap()
+}
+
+fn imm_of_turns(problem: &Problem) -> Imm<Kalman<Turn, Position<2>>> {
+    let modes = [0.0, 0.05, -0.05]
+        .map(|rate| Kalman::new(Turn::new(rate, problem.density).with_speed(20.0), problem.sensor()));
+    Imm::new(modes, Transition::sticky(0.95)).unwrap()
+}
+
+/// Filters of different types and state lengths.
+fn imm_of_types(problem: &Problem) -> Imm<Boxed<6>> {
+    let accelerating = ConstantAcceleration::new(problem.density).with_speed(20.0).with_acceleration(1.0);
+    let modes: [Boxed<6>; 3] = [
+        Box::new(Padded::<_, 4>::new(kalman(problem), 2.0).unwrap()),
+        Box::new(Kalman::new(accelerating, problem.sensor())),
+        Box::new(Unscented::new(accelerating, problem.sensor())),
+    ];
+    Imm::new(modes, Transition::sticky(0.95).per(1.0)).unwrap()
+}
+
+fn unscented(problem: &Problem) -> Unscented<ConstantVelocity, Position<2>> {
+    Unscented::new(problem.motion(), problem.sensor())
+}
+
+conformance!(kalman_filter, positions::<4, _, _>(Expectations::exact(), kalman));
+conformance!(
+    extended_filter,
+    positions::<4, _, _>(Expectations::exact(), |p| Extended::new(p.motion(), p.sensor()))
+);
+conformance!(unscented_filter, positions::<4, _, _>(Expectations::exact(), unscented));
+conformance!(
+    unscented_filter_with_close_points,
+    positions::<4, _, _>(Expectations::exact(), |p| {
+        unscented(p).with_points(SigmaPoints::new(0.01, 2.0, 1.0).unwrap())
+    })
+);
+conformance!(imm_with_equal_modes, positions::<4, _, _>(Expectations::exact(), imm_of_equals));
+conformance!(imm_with_turns, positions::<4, _, _>(Expectations::own_models(), imm_of_turns));
+conformance!(imm_with_boxes, positions::<6, _, _>(Expectations::own_models(), imm_of_types));
+conformance!(
+    nested_imm,
+    positions::<4, _, _>(Expectations::exact(), |p| {
+        Imm::new([imm_of_equals(p), imm_of_equals(p)], Transition::sticky(0.9)).unwrap()
+    })
+);
+conformance!(
+    padded_filter,
+    positions::<6, _, _>(Expectations::exact(), |p| Padded::<_, 4>::new(kalman(p), 2.0).unwrap())
+);
+conformance!(
+    boxed_filter,
+    positions::<4, _, _>(Expectations::exact(), |p| -> Boxed<4> { Box::new(kalman(p)) })
+);
+conformance!(extended_filter_of_range_and_bearing, polar::Polar(polar::extended));
+conformance!(unscented_filter_of_range_and_bearing, polar::Polar(polar::unscented));

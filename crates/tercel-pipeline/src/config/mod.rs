@@ -1,0 +1,113 @@
+//! The configuration file: one TOML file describes the sensors, the motion, the filter and the tracker.
+//!
+//! Every key has a default except the motion and the sensors; `schema` prints them all with units and ranges.
+
+mod filter;
+mod motion;
+mod number;
+mod sensor;
+mod tracker;
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::PipelineError;
+
+pub use filter::{Estimator, FilterConfig};
+pub use motion::{AccelerationModel, MotionConfig, Singer, Switching, TurnModel};
+pub use number::{Count, NonNegative, Positive, Probability};
+pub use sensor::{
+    Bearing, ClutterConfig, DetectionConfig, MapClutter, Measures, Polar, PositionSensor, SensorConfig,
+    UniformClutter,
+};
+pub use tracker::{
+    ConfirmConfig, HitsConfig, ManagementConfig, NearestNeighbourConfig, PhdConfig, TrackerConfig,
+};
+
+/// A whole configuration file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Tercel configuration")]
+pub struct Config {
+    /// How the objects move.
+    pub motion: MotionConfig,
+    /// How an object's state is estimated.
+    #[serde(default)]
+    pub filter: FilterConfig,
+    /// How objects are found among the detections.
+    #[serde(default)]
+    pub tracker: TrackerConfig,
+    /// What comes in: the sensors to leave out, and scans that come too late.
+    #[serde(default)]
+    pub input: InputConfig,
+    /// The sensors, by their names in the data. The section `default` serves every sensor without one of its own.
+    pub sensors: BTreeMap<String, SensorConfig>,
+}
+
+/// What comes in.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct InputConfig {
+    /// Names of sensors whose scans are left out.
+    pub ignore: Vec<String>,
+    /// What happens to a scan that is older than one before it.
+    pub out_of_order: OutOfOrder,
+    /// With `out_of_order = "buffer"`: how long scans are held back, so that late ones can take their place.
+    #[schemars(extend("x-unit" = "s"))]
+    pub delay: NonNegative,
+}
+
+/// What happens to a scan that is older than one before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OutOfOrder {
+    /// It is left out and counted.
+    #[default]
+    Drop,
+    /// Scans are held back by `delay` and sorted; one that is later than that is left out and counted.
+    Buffer,
+}
+
+impl Config {
+    /// Reads a configuration from TOML.
+    ///
+    /// # Errors
+    /// When the text is not TOML, a key is unknown or missing, or a value lies outside its range. The message points at the
+    /// line and the column.
+    pub fn parse(text: &str) -> Result<Self, PipelineError> {
+        let config: Config = toml::from_str(text).map_err(|error| PipelineError::Syntax(Box::new(error)))?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The configuration as TOML.
+    pub fn to_toml(&self) -> String {
+        // Every type here has a TOML form, so serialisation cannot fail; an empty text would say so.
+        toml::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// The JSON Schema of the file: every key with its unit, its range and what it does.
+    pub fn schema() -> serde_json::Value {
+        schemars::schema_for!(Config).to_value()
+    }
+
+    /// Checks what no single key can say: that the parts fit together.
+    fn check(&self) -> Result<(), PipelineError> {
+        if self.sensors.is_empty() {
+            return Err(PipelineError::config(
+                "sensors",
+                "there is no sensor; add a section such as [sensors.radar]",
+            ));
+        }
+        self.motion.check("motion")?;
+        for (name, sensor) in &self.sensors {
+            sensor.check(&format!("sensors.{name}"), self)?;
+        }
+        self.filter.check(&self.motion, &self.sensors)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,184 @@
+//! The sensor sections.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Config, NonNegative, Positive, Probability};
+use crate::PipelineError;
+
+/// One sensor: what it measures, how likely it sees an object, and how much clutter it has.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorConfig {
+    /// What it measures, and how accurately.
+    pub measures: Measures,
+    /// Where it stands in the local frame (x, y), unless the data say.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub position: [f64; 2],
+    /// How likely it sees an object that is there.
+    #[serde(default)]
+    pub detection: DetectionConfig,
+    /// How many of its detections come from no object.
+    pub clutter: ClutterConfig,
+}
+
+/// What a sensor measures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Measures {
+    /// Positions in the local frame.
+    Position(PositionSensor),
+    /// Range and bearing, and range rate if its deviation is given.
+    Polar(Polar),
+    /// Bearings alone.
+    Bearing(Bearing),
+}
+
+/// A sensor of positions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PositionSensor {
+    /// Standard deviation of the position, per axis, for detections that do not bring their own.
+    #[schemars(extend("x-unit" = "m"))]
+    pub deviation: Positive,
+    /// Age of the position when it is reported: an object is seen where it was.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s"))]
+    pub lag: NonNegative,
+}
+
+/// A sensor of range and bearing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Polar {
+    /// Standard deviation of the range.
+    #[schemars(extend("x-unit" = "m"))]
+    pub range_deviation: Positive,
+    /// Standard deviation of the bearing.
+    #[schemars(extend("x-unit" = "rad"))]
+    pub bearing_deviation: Positive,
+    /// Standard deviation of the range rate; without it range rates are not used.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub range_rate_deviation: Option<Positive>,
+    /// Turn range and bearing into a position first (debiased, with rotated covariance). Not with range rates.
+    #[serde(default)]
+    pub convert: bool,
+    /// With `convert`: age of the position when it is reported.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s"))]
+    pub lag: NonNegative,
+}
+
+/// A sensor of bearings alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Bearing {
+    /// Standard deviation of the bearing.
+    #[schemars(extend("x-unit" = "rad"))]
+    pub deviation: Positive,
+    /// Mean range at which a bearing alone may start an object; without it no object starts.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub start_range: Option<Positive>,
+    /// Standard deviation of that range; half of it when it is not given.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub start_range_deviation: Option<Positive>,
+}
+
+/// Probability of detection.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a probability, or a table such as [[60.0, 0.9], [110.0, 0.0]]")]
+pub enum DetectionConfig {
+    /// The same everywhere, 0 to 1.
+    Uniform(#[schemars(extend("x-unit" = "1"))] Probability),
+    /// By range: pairs of a range (m, rising) and the probability there (0 to 1); linear in between.
+    ByRange(#[schemars(extend("x-unit" = "m, 1"))] Vec<(NonNegative, Probability)>),
+}
+
+impl Default for DetectionConfig {
+    fn default() -> Self {
+        DetectionConfig::Uniform(Probability::constant(0.9))
+    }
+}
+
+/// Clutter: detections that come from no object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ClutterConfig {
+    /// The same everywhere.
+    Uniform(UniformClutter),
+    /// Learned where it stays in place, scan by scan.
+    Map(MapClutter),
+}
+
+/// Clutter that is the same everywhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UniformClutter {
+    /// Expected clutter detections per scan and m² (per rad for bearings alone): ten a scan on a square kilometre are 1e-5.
+    #[schemars(extend("x-unit" = "1/m²"))]
+    pub density: Positive,
+}
+
+/// Clutter that stays in place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MapClutter {
+    /// Expected clutter detections per scan and m² where nothing was learned.
+    #[schemars(extend("x-unit" = "1/m²"))]
+    pub background: Positive,
+    /// Width of a cell of the map: a few times the accuracy of the sensor.
+    #[schemars(extend("x-unit" = "m"))]
+    pub cell: Positive,
+    /// Number of scans over which a cell averages.
+    #[schemars(extend("x-unit" = "1"))]
+    pub memory: Positive,
+}
+
+impl Measures {
+    pub(super) fn is_linear(&self) -> bool {
+        match self {
+            Measures::Position(_) => true,
+            Measures::Polar(polar) => polar.convert,
+            Measures::Bearing(_) => false,
+        }
+    }
+}
+
+impl SensorConfig {
+    pub(super) fn check(&self, key: &str, config: &Config) -> Result<(), PipelineError> {
+        if !self.position.iter().all(|x| x.is_finite()) {
+            return Err(PipelineError::config(&format!("{key}.position"), "must be finite"));
+        }
+        if let DetectionConfig::ByRange(table) = &self.detection {
+            let key = format!("{key}.detection");
+            if table.is_empty() {
+                return Err(PipelineError::config(&key, "the table is empty"));
+            }
+            if table.windows(2).any(|pair| pair[1].0 <= pair[0].0) {
+                return Err(PipelineError::config(&key, "the ranges of the table must rise"));
+            }
+        }
+        let Measures::Polar(polar) = &self.measures else { return Ok(()) };
+        let key = format!("{key}.measures.polar");
+        if polar.convert && polar.range_rate_deviation.is_some() {
+            return Err(PipelineError::config(
+                &format!("{key}.convert"),
+                "range rates cannot be converted into positions; leave out range_rate_deviation or convert",
+            ));
+        }
+        if polar.lag.get() > 0.0 && !polar.convert {
+            return Err(PipelineError::config(&format!("{key}.lag"), "needs convert = true"));
+        }
+        if polar.range_rate_deviation.is_some() && config.motion.labels().len() < 4 {
+            return Err(PipelineError::config(
+                &format!("{key}.range_rate_deviation"),
+                "a range rate needs a motion with velocities, and random_walk has none",
+            ));
+        }
+        Ok(())
+    }
+}

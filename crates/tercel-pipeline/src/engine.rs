@@ -1,0 +1,233 @@
+//! A tracker and a filter whose types are chosen at run time.
+
+use nalgebra::Vector2;
+use tercel_core::error::FilterError;
+use tercel_core::filter::{Filter, Transition};
+use tercel_core::motion::{
+    ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Motion, RandomWalk, Singer, Turn,
+};
+use tercel_core::multi::{self, NearestNeighbour, Phd, Tracker, TrackerError, Use};
+use tercel_core::sensor::{Measurement, Sensor};
+use tercel_data::table::{self, Scan};
+
+use crate::PipelineError;
+use crate::config::{self, Config, Estimator, MotionConfig, TrackerConfig};
+use crate::estimator::{Mode, Recursion, Rule, Single, Switching};
+use crate::sensors::{self, Kind, Station};
+
+/// What a scan led to.
+pub(crate) struct Outcome {
+    /// The tracks after the scan.
+    pub rows: Vec<table::Track>,
+    /// Where each detection lies in the plane, if it says so, and what became of it.
+    pub uses: Vec<(Option<Vector2<f64>>, Use)>,
+}
+
+/// A tracker with its filter.
+pub(crate) trait Engine {
+    /// Takes in one scan of one sensor.
+    fn step(&mut self, station: &Station, scan: &Scan) -> Result<Outcome, PipelineError>;
+}
+
+/// The engine that a configuration describes.
+pub(crate) fn engine(config: &Config) -> Result<Box<dyn Engine>, PipelineError> {
+    let rule = match config.filter.estimator {
+        Estimator::Unscented => Rule::Unscented,
+        _ => Rule::Extended,
+    };
+    match (&config.motion, config.motion.labels().len()) {
+        (MotionConfig::Switching(switching), 4) => {
+            with_tracker(modes::<4>(switching, rule, velocity_motion)?, config)
+        }
+        (MotionConfig::Switching(switching), 5) => {
+            with_tracker(modes::<5>(switching, rule, turn_motion)?, config)
+        }
+        (MotionConfig::Switching(switching), 6) => {
+            with_tracker(modes::<6>(switching, rule, acceleration_motion)?, config)
+        }
+        (MotionConfig::Switching(_), _) => {
+            Err(PipelineError::config("motion.switching.modes", "at least one mode must have velocities"))
+        }
+        (motion, 2) => with_single::<2>(position_motion(motion)?, rule, config),
+        (motion, 4) => with_single::<4>(velocity_motion(motion)?, rule, config),
+        (motion, 5) => with_single::<5>(turn_motion(motion)?, rule, config),
+        (motion, _) => with_single::<6>(acceleration_motion(motion)?, rule, config),
+    }
+}
+
+fn with_single<const N: usize>(
+    motion: Box<dyn Motion<N>>,
+    rule: Rule,
+    config: &Config,
+) -> Result<Box<dyn Engine>, PipelineError> {
+    with_tracker::<N, _>(Single { motion, rule }, config)
+}
+
+fn with_tracker<const N: usize, R>(recursion: R, config: &Config) -> Result<Box<dyn Engine>, PipelineError>
+where
+    R: Recursion<N> + 'static,
+{
+    let key = |error| PipelineError::parameter("tracker", &error);
+    Ok(match &config.tracker {
+        TrackerConfig::NearestNeighbour(settings) => {
+            let tracker = settings.build().and_then(NearestNeighbour::<R::Belief>::new).map_err(key)?;
+            Box::new(Runner { recursion, tracker })
+        }
+        TrackerConfig::Phd(settings) => {
+            let tracker = settings.build().and_then(Phd::<R::Belief>::new).map_err(key)?;
+            Box::new(Runner { recursion, tracker })
+        }
+    })
+}
+
+struct Runner<R, T, const N: usize> {
+    recursion: R,
+    tracker: T,
+}
+
+impl<R, T, const N: usize> Runner<R, T, N>
+where
+    R: Recursion<N>,
+    T: Tracker<Belief = R::Belief>,
+{
+    fn run<const M: usize>(
+        &mut self,
+        sensor: &dyn Sensor<N, M>,
+        station: &Station,
+        scan: &Scan,
+        measurements: &[Measurement<M>],
+    ) -> Result<Outcome, PipelineError> {
+        let tracker = &mut self.tracker;
+        let detection = station.detection();
+        let seen =
+            multi::Scan { time: scan.time, measurements, detection: &detection, clutter: &station.clutter };
+        let stepped: Result<Outcome, TrackerError> = self
+            .recursion
+            .with(sensor, |filter| {
+                tracker.step(filter, &seen)?;
+                let places = measurements.iter().map(|measurement| filter.place(measurement));
+                let uses = places.zip(tracker.uses().iter().copied()).collect();
+                Ok(Outcome { rows: rows(filter, tracker.tracks(), scan), uses })
+            })
+            .map_err(|error| PipelineError::parameter("motion", &error))?;
+        stepped.map_err(|source| PipelineError::Tracker { sensor: scan.sensor.to_string(), source })
+    }
+}
+
+impl<R, T, const N: usize> Engine for Runner<R, T, N>
+where
+    R: Recursion<N>,
+    T: Tracker<Belief = R::Belief>,
+{
+    fn step(&mut self, station: &Station, scan: &Scan) -> Result<Outcome, PipelineError> {
+        match &station.kind {
+            Kind::Position(sensor) => self.run(sensor, station, scan, &sensors::positions(scan)?),
+            Kind::Converted(sensor) => self.run(sensor, station, scan, &sensors::ranges(scan)?),
+            Kind::RangeBearing(sensor) => self.run(sensor, station, scan, &sensors::ranges(scan)?),
+            Kind::RangeBearingRate(sensor) => self.run(sensor, station, scan, &sensors::range_rates(scan)?),
+            Kind::Bearing(sensor) => self.run(sensor, station, scan, &sensors::bearings(scan)?),
+        }
+    }
+}
+
+/// The tracks of a tracker as rows of the table.
+fn rows<const N: usize, const M: usize, B: Clone>(
+    filter: &dyn Filter<N, Belief = B, Measurement = Measurement<M>>,
+    tracks: &[multi::Track<B>],
+    scan: &Scan,
+) -> Vec<table::Track> {
+    let row = |track: &multi::Track<B>| {
+        let estimate = filter.estimate(&track.belief);
+        let upper = (0..N).flat_map(|i| (i..N).map(move |j| (i, j)));
+        table::Track {
+            time: scan.time,
+            sensor: scan.sensor.clone(),
+            track: track.id,
+            status: track.status,
+            existence: track.existence,
+            state: estimate.mean.iter().copied().collect(),
+            covariance: upper.map(|index| estimate.covariance[index]).collect(),
+            modes: estimate.modes,
+            extent: None,
+            detection: track.measurement.map(|number| scan.detections[number].id),
+        }
+    };
+    tracks.iter().map(row).collect()
+}
+
+fn modes<const N: usize>(
+    switching: &config::Switching,
+    rule: Rule,
+    whole: impl Fn(&MotionConfig) -> Result<Box<dyn Motion<N>>, PipelineError>,
+) -> Result<Switching<N>, PipelineError> {
+    let mode = |motion: &MotionConfig| {
+        Ok(match motion.labels().len() {
+            length if length == N => Mode::Whole(whole(motion)?),
+            2 => Mode::Positions(position_motion(motion)?),
+            _ => Mode::Velocities(velocity_motion(motion)?),
+        })
+    };
+    let modes: Vec<Mode<N>> = switching.modes.iter().map(mode).collect::<Result<_, PipelineError>>()?;
+    // What a smaller mode lacks is as large as the larger ones expect of a new object.
+    let missing = modes.iter().find_map(|mode| match mode {
+        Mode::Whole(motion) => Some(motion.prior().deviations()[N - 1]),
+        _ => None,
+    });
+    let transition = Transition::sticky(switching.stay.get()).per(1.0);
+    let switching = Switching { modes, rule, transition, missing: missing.unwrap_or(1.0) };
+    // Building the filter once, for any sensor, finds what is wrong with it before the first scan.
+    let probe: tercel_core::sensor::Position<2> = tercel_core::sensor::Position::new(1.0)
+        .map_err(|error| PipelineError::parameter("motion.switching", &error))?;
+    switching.filter(&probe).map_err(|error| PipelineError::parameter("motion.switching", &error))?;
+    Ok(switching)
+}
+
+fn position_motion(config: &MotionConfig) -> Result<Box<dyn Motion<2>>, PipelineError> {
+    match config {
+        MotionConfig::RandomWalk { density } => Ok(Box::new(RandomWalk::new(density.get()))),
+        other => Err(wrong_state(other)),
+    }
+}
+
+fn velocity_motion(config: &MotionConfig) -> Result<Box<dyn Motion<4>>, PipelineError> {
+    Ok(match config {
+        MotionConfig::ConstantVelocity(model) => {
+            Box::new(ConstantVelocity::new(model.acceleration_density.get()).with_speed(model.speed.get()))
+        }
+        MotionConfig::Turn(turn) => {
+            Box::new(Turn::new(turn.rate, turn.acceleration_density.get()).with_speed(turn.speed.get()))
+        }
+        other => return Err(wrong_state(other)),
+    })
+}
+
+fn turn_motion(config: &MotionConfig) -> Result<Box<dyn Motion<5>>, PipelineError> {
+    match config {
+        MotionConfig::CoordinatedTurn { acceleration_density, rate_density, speed, rate } => Ok(Box::new(
+            CoordinatedTurn::new(acceleration_density.get(), rate_density.get())
+                .with_speed(speed.get())
+                .with_rate(rate.get()),
+        )),
+        other => Err(wrong_state(other)),
+    }
+}
+
+fn acceleration_motion(config: &MotionConfig) -> Result<Box<dyn Motion<6>>, PipelineError> {
+    Ok(match config {
+        MotionConfig::ConstantAcceleration { jerk_density, speed, acceleration } => Box::new(
+            ConstantAcceleration::new(jerk_density.get())
+                .with_speed(speed.get())
+                .with_acceleration(acceleration.get()),
+        ),
+        MotionConfig::Singer(model) => Box::new(
+            Singer::new(model.time.get(), model.acceleration.get())
+                .map_err(|error: FilterError| PipelineError::parameter("motion.singer", &error))?
+                .with_speed(model.speed.get()),
+        ),
+        other => return Err(wrong_state(other)),
+    })
+}
+
+fn wrong_state(config: &MotionConfig) -> PipelineError {
+    PipelineError::config("motion", &format!("`{}` does not fit the state of the other modes", config.name()))
+}

@@ -1,0 +1,214 @@
+//! The picture of a recording: tables turned into compact columns for the page.
+
+mod plots;
+mod tracks;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+use tercel_data::table::{Detections, Status, Tracks, Truth, Truths};
+
+use self::plots::Plots;
+use self::tracks::{TrackColumns, columns_of_tracks};
+use super::chart::ChartData;
+use super::number::Number;
+use super::{Chart, Form, ReportError};
+
+/// More detections than this are thinned for drawing: a page has to stay quick.
+const DRAWN_DETECTIONS: usize = 200_000;
+
+/// More rows of tracks than this are thinned for drawing.
+const DRAWN_TRACK_ROWS: usize = 300_000;
+
+/// A recording in plan view: detections, tracks with their 2-sigma ellipses, and truth, with a time slider.
+///
+/// Times of the page count from the first scan. What has no finite time or position is not drawn; the page says
+/// how much that is. Of more than 200,000 detections or 300,000 rows of tracks, an even share is drawn, and the page
+/// says so; figures in tables come from all rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    start: f64,
+    times: Vec<Number>,
+    plots: Plots,
+    modes: Vec<String>,
+    tracks: Vec<TrackColumns>,
+    truths: Vec<TruthColumns>,
+    notes: Vec<String>,
+    charts: Vec<Chart>,
+    counts: Option<Chart>,
+}
+
+/// What is known about a sensor besides its scans.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SensorNote {
+    /// The name in [`Scan::sensor`](tercel_data::table::Scan::sensor).
+    pub sensor: String,
+    /// How the page calls it; the name itself if there is no other.
+    pub label: Option<String>,
+    /// Where it stands in the local frame (`x, y`), m, when the scans do not say so.
+    pub position: Option<[f64; 2]>,
+}
+
+/// One true object, in the order of time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct TruthColumns {
+    name: String,
+    t: Vec<Number>,
+    x: Vec<Number>,
+    y: Vec<Number>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    vx: Vec<Number>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    vy: Vec<Number>,
+}
+
+/// The picture as the page reads it.
+#[derive(Serialize)]
+pub(super) struct PictureData<'a> {
+    start: Number,
+    times: &'a [Number],
+    #[serde(flatten)]
+    plots: &'a Plots,
+    modes: &'a [String],
+    tracks: &'a [TrackColumns],
+    truths: &'a [TruthColumns],
+    notes: &'a [String],
+    charts: Vec<ChartData>,
+}
+
+impl Picture {
+    /// Takes what the page needs from the tables. A last chart counts tracks and, with `truths`, objects.
+    ///
+    /// # Errors
+    /// When the tracks have no `x` and `y`, or a state does not fit the labels.
+    pub fn new(
+        detections: &Detections,
+        tracks: &Tracks,
+        truths: Option<&Truths>,
+        sensors: &[SensorNote],
+    ) -> Result<Picture, ReportError> {
+        let times = slider_times(detections, tracks, truths);
+        let start = times.first().copied().unwrap_or(0.0);
+        let mut notes = Vec::new();
+        let plots = Plots::of(detections, sensors, start, DRAWN_DETECTIONS, &mut notes);
+        let reports = report_times(detections, tracks);
+        let columns = columns_of_tracks(tracks, start, &reports, DRAWN_TRACK_ROWS, &mut notes)?;
+        let counted = if reports.is_empty() { &times } else { &reports };
+        Ok(Picture {
+            start,
+            times: times.iter().map(|time| Number::milli(time - start)).collect(),
+            plots,
+            modes: tracks.modes.clone(),
+            tracks: columns,
+            truths: truths.map_or_else(Vec::new, |truths| columns_of_truths(truths, start)),
+            notes,
+            charts: Vec::new(),
+            counts: (!times.is_empty()).then(|| count_chart(counted, tracks, truths)),
+        })
+    }
+
+    /// Adds a chart over the time of the recording. A line marks the time of the slider, and a click moves it.
+    pub fn with_chart(mut self, chart: Chart) -> Picture {
+        self.charts.push(chart);
+        self
+    }
+
+    pub(super) fn data(&self) -> Result<PictureData<'_>, ReportError> {
+        let charts = self.charts.iter().chain(&self.counts);
+        Ok(PictureData {
+            start: Number::milli(self.start),
+            times: &self.times,
+            plots: &self.plots,
+            modes: &self.modes,
+            tracks: &self.tracks,
+            truths: &self.truths,
+            notes: &self.notes,
+            charts: charts.map(|chart| chart.data(self.start)).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+/// The times at which the slider stops: those of scans and tracks; those of the truth if there is nothing else.
+fn slider_times(detections: &Detections, tracks: &Tracks, truths: Option<&Truths>) -> Vec<f64> {
+    let scans = detections.scans.iter().map(|scan| scan.time);
+    let times = sorted_times(scans.chain(tracks.rows.iter().map(|row| row.time)));
+    if !times.is_empty() {
+        return times;
+    }
+    sorted_times(truths.iter().flat_map(|truths| &truths.rows).map(|row| row.time))
+}
+
+/// The times at which a tracker told its tracks: those of the scans of sensors that it reported on, so that a scan
+/// without any track counts as one.
+fn report_times(detections: &Detections, tracks: &Tracks) -> Vec<f64> {
+    let sensors: BTreeSet<&str> = tracks.rows.iter().map(|row| &*row.sensor).collect();
+    let scans = detections.scans.iter().filter(|scan| sensors.contains(&*scan.sensor)).map(|scan| scan.time);
+    sorted_times(scans.chain(tracks.rows.iter().map(|row| row.time)))
+}
+
+/// Finite times in ascending order, each once.
+fn sorted_times(times: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut times: Vec<f64> = times.filter(|time| time.is_finite()).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
+}
+
+/// Objects and tracks over time.
+fn count_chart(times: &[f64], tracks: &Tracks, truths: Option<&Truths>) -> Chart {
+    let mut confirmed = vec![0.0; times.len()];
+    let mut tentative = vec![0.0; times.len()];
+    for row in &tracks.rows {
+        let Ok(at) = times.binary_search_by(|time| time.total_cmp(&row.time)) else { continue };
+        match row.status {
+            Status::Confirmed | Status::Coasted => confirmed[at] += 1.0,
+            Status::Tentative => tentative[at] += 1.0,
+            Status::Deleted => {}
+        }
+    }
+    let chart = Chart::over_time("Number of tracks", "", times.to_vec())
+        .with_form(Form::Steps)
+        .with_part("confirmed tracks", confirmed)
+        .with_part("tentative tracks", tentative);
+    match truths {
+        Some(truths) => chart.with_part("true objects", count_objects(times, truths)),
+        None => chart,
+    }
+}
+
+/// How many true objects are there at each time: an object is there from its first row to its last.
+fn count_objects(times: &[f64], truths: &Truths) -> Vec<f64> {
+    let mut lives: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    for row in truths.rows.iter().filter(|row| row.time.is_finite()) {
+        let life = lives.entry(&row.object).or_insert((row.time, row.time));
+        *life = (life.0.min(row.time), life.1.max(row.time));
+    }
+    let alive = |time: f64| lives.values().filter(|(first, last)| (*first..=*last).contains(&time)).count();
+    times.iter().map(|&time| alive(time) as f64).collect()
+}
+
+fn columns_of_truths(truths: &Truths, start: f64) -> Vec<TruthColumns> {
+    let mut objects: BTreeMap<&str, Vec<&Truth>> = BTreeMap::new();
+    for row in truths.rows.iter().filter(|row| row.time.is_finite()) {
+        objects.entry(&row.object).or_default().push(row);
+    }
+    let columns = |(name, mut rows): (&str, Vec<&Truth>)| {
+        rows.sort_by(|a, b| a.time.total_cmp(&b.time));
+        let column =
+            |value: &dyn Fn(&Truth) -> f64| rows.iter().map(|row| Number::milli(value(row))).collect();
+        let moving = rows.iter().any(|row| row.velocity.is_some());
+        let speed = |axis: usize| match moving {
+            true => column(&|row| row.velocity.map_or(f64::NAN, |velocity| velocity[axis])),
+            false => Vec::new(),
+        };
+        TruthColumns {
+            name: name.to_owned(),
+            t: column(&|row| row.time - start),
+            x: column(&|row| row.position[0]),
+            y: column(&|row| row.position[1]),
+            vx: speed(0),
+            vy: speed(1),
+        }
+    };
+    objects.into_iter().map(columns).collect()
+}

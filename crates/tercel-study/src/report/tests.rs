@@ -1,0 +1,142 @@
+//! What every report holds to, whatever the tables hold.
+
+use tercel_data::table::{
+    Detection, Detections, Noise, Observation, Scan, Status, Track, Tracks, Truth, Truths,
+};
+
+use super::*;
+
+const ATTACK: &str = "</script><script>alert(1)</script><img src=x onerror=alert(1)>";
+
+fn detections(name: &str, x: f64) -> Detections {
+    let observation = Observation::Position { x, y: 2.0, z: None };
+    let detection = Detection { id: 1, observation, noise: Noise::default(), truth: Some(name.into()) };
+    let scan = Scan { time: 1.0, sensor: name.into(), position: None, detections: vec![detection] };
+    Detections { origin: None, scans: vec![scan] }
+}
+
+fn tracks(name: &str, number: f64) -> Tracks {
+    let row = Track {
+        time: 1.0,
+        sensor: name.into(),
+        track: 1,
+        status: Status::Confirmed,
+        existence: number,
+        state: vec![number; 4],
+        covariance: vec![number; 10],
+        modes: vec![number],
+        extent: Some([number; 3]),
+        detection: Some(1),
+    };
+    let labels = ["x", "y", "vx", "vy"].map(String::from).to_vec();
+    Tracks { origin: None, labels, modes: vec![name.to_owned()], rows: vec![row] }
+}
+
+fn truths(name: &str, number: f64) -> Truths {
+    let row = Truth {
+        time: 1.0,
+        object: name.into(),
+        position: [number; 2],
+        z: None,
+        velocity: Some([number; 2]),
+        extent: None,
+    };
+    Truths { origin: None, rows: vec![row] }
+}
+
+/// The data of a page, read back from its HTML.
+fn data_of(page: &str) -> serde_json::Value {
+    let begin = page.find("type=\"application/json\">").unwrap() + "type=\"application/json\">".len();
+    let end = begin + page[begin..].find("</script>").unwrap();
+    serde_json::from_str(&page[begin..end]).unwrap()
+}
+
+#[test]
+fn every_combination_of_empty_tables_gives_a_page() {
+    for choice in 0..8 {
+        let detections = if choice & 1 == 0 { Detections::default() } else { detections("radar", 1.0) };
+        let tracks = if choice & 2 == 0 { Tracks::default() } else { tracks("cv", 1.0) };
+        let truths = (choice & 4 != 0).then(|| truths("boat", 1.0));
+        let picture = Picture::new(&detections, &tracks, truths.as_ref(), &[]).unwrap();
+        let page = Report::new("empty").with(picture).render().unwrap();
+        let data = &data_of(&page)[0];
+        assert_eq!(data["times"].as_array().unwrap().is_empty(), choice == 0);
+        assert_eq!(data["tracks"].as_array().unwrap().len(), (choice >> 1) & 1);
+        assert_eq!(data["truths"].as_array().unwrap().len(), (choice >> 2) & 1);
+    }
+    assert_eq!(data_of(&Report::new("nothing at all").render().unwrap()), serde_json::json!([]));
+}
+
+#[test]
+fn text_of_users_is_shown_and_never_run() {
+    let note = SensorNote { sensor: ATTACK.into(), label: Some(ATTACK.into()), position: None };
+    let picture = Picture::new(
+        &detections(ATTACK, 1.0),
+        &tracks(ATTACK, 1.0),
+        Some(&truths(ATTACK, 1.0)),
+        std::slice::from_ref(&note),
+    );
+    let chart = Chart::over(ATTACK, ATTACK, ATTACK, vec![0.0]).with_part(ATTACK, vec![1.0]);
+    let page = Report::new(ATTACK)
+        .with_subtitle(ATTACK)
+        .with(Summary::new().with(ATTACK, ATTACK, Some(ATTACK)))
+        .with(picture.unwrap().with_chart(chart.clone()))
+        .with(chart)
+        .render()
+        .unwrap();
+    assert!(!page.contains("<script>alert") && !page.contains("<img"));
+    // Data, library and scripts of the page.
+    assert_eq!(page.matches("</script>").count(), 3);
+    let data = data_of(&page);
+    assert_eq!(data[0]["sensors"][0]["name"], ATTACK);
+    assert_eq!(data[0]["truths"][0]["name"], ATTACK);
+    assert_eq!(data[1]["parts"][0]["name"], ATTACK);
+}
+
+#[test]
+fn numbers_that_are_not_finite_never_reach_the_page() {
+    for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let picture = Picture::new(
+            &detections("radar", number),
+            &tracks("cv", number),
+            Some(&truths("boat", number)),
+            &[],
+        )
+        .unwrap()
+        .with_chart(Chart::over_time("GOSPA", "m", vec![number]).with_part("missed", vec![number]));
+        let data = data_of(&Report::new("not finite").with(picture).render().unwrap());
+        assert_eq!(data[0]["tracks"][0]["x"], serde_json::json!([null]));
+        assert_eq!(data[0]["tracks"][0]["peak"], serde_json::json!(null));
+        assert_eq!(data[0]["truths"][0]["x"], serde_json::json!([null]));
+        assert_eq!(data[0]["charts"][0]["x"], serde_json::json!([null]));
+    }
+}
+
+#[test]
+fn tracks_and_objects_are_counted_at_every_time() {
+    let picture =
+        Picture::new(&detections("radar", 1.0), &tracks("cv", 1.0), Some(&truths("boat", 1.0)), &[]).unwrap();
+    let data = data_of(&Report::new("counts").with(picture).render().unwrap());
+    let parts = &data[0]["charts"][0]["parts"];
+    assert_eq!(parts[0]["y"], serde_json::json!([1]));
+    assert_eq!(parts[1]["y"], serde_json::json!([0]));
+    assert_eq!(parts[2]["y"], serde_json::json!([1]));
+}
+
+#[test]
+fn a_written_report_is_whole_and_leaves_nothing_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("report.html");
+    std::fs::write(&path, "an older report").unwrap();
+    let report = Report::new("written");
+    report.write(&path).unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), report.render().unwrap());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_path_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = Report::new("lost").write(folder.path().join("missing/report.html")).unwrap_err();
+    assert!(error.to_string().contains("missing"), "{error}");
+}
