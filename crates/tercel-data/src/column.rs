@@ -148,7 +148,7 @@ impl Limits {
                 refusal.helped("bearings run from -pi to pi: subtract 2 pi from the larger ones")
             }
             Limits::Finite | Limits::NotNegative | Limits::Positive if !value.is_finite() => {
-                refusal.helped("leave out rows without a measurement, or leave the cell empty if it may be")
+                refusal.helped("what is not known is an empty cell, or no row at all")
             }
             _ => refusal,
         })
@@ -156,7 +156,7 @@ impl Limits {
 }
 
 /// The same angle in [-π, π].
-fn wrapped(angle: f64) -> f64 {
+pub(crate) fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(2.0 * PI);
     if turned > PI { turned - 2.0 * PI } else { turned }
 }

@@ -86,10 +86,10 @@ pub enum DataError {
         help: String,
     },
     /// A column that is there twice, or whose name is almost a known one.
-    #[error("{file}: column `{column}` {problem}")]
+    #[error("{place}: column `{column}` {problem}")]
     Column {
-        /// The file.
-        file: Arc<str>,
+        /// Where: the file, or a line of a stream.
+        place: Place,
         /// Name of the column.
         column: String,
         /// What is wrong with it.
@@ -112,7 +112,7 @@ pub enum DataError {
         help: String,
     },
     /// The description of the file (schema version, kind of table, labels) does not fit.
-    #[error("{file}: the description of the table says {problem}")]
+    #[error("{file}: in the description of the table, {problem}")]
     Metadata {
         /// The file.
         file: Arc<str>,
@@ -127,13 +127,13 @@ pub enum DataError {
         /// Where.
         place: Place,
         /// Name of the column.
-        column: String,
+        column: Box<str>,
         /// The value, as it stands in the file; `empty` when there is none.
-        value: String,
+        value: Box<str>,
         /// What was expected.
-        expected: String,
+        expected: Box<str>,
         /// What to do, when that is known.
-        help: Option<String>,
+        help: Option<Box<str>>,
     },
     /// The cells of a row are fine one by one, but do not fit each other or the rows before.
     #[error("{place}: {problem}")]
@@ -208,7 +208,13 @@ impl Refusal {
 
     pub fn at(self, place: Place, column: &str) -> DataError {
         let Refusal { value, expected, help } = self;
-        DataError::Value { place, column: column.to_owned(), value, expected, help }
+        DataError::Value {
+            place,
+            column: column.into(),
+            value: value.into(),
+            expected: expected.into(),
+            help: help.map(String::into),
+        }
     }
 }
 

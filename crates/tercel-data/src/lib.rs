@@ -2,7 +2,7 @@
 //!
 //! There are four [tables](table): detections, tracks, truth and metrics. Each has one set of columns, in SI units
 //! and radians, and is the same in CSV, Parquet and NDJSON; the ending of a file's name chooses the format.
-//! Recordings of other programs come in by [`import`].
+//! Recordings of other programs come in by [`import()`].
 //!
 //! ```
 //! use tercel_data::{ReadOptions, read_detections, write_detections};
@@ -40,7 +40,7 @@ mod write;
 pub use column::Angles;
 pub use error::{DataError, Place, Spot};
 pub use format::Format;
-pub use import::{ImportOptions, Imported, Source, import};
+pub use import::{ImportOptions, Imported, LeftOut, Source, import};
 pub use metadata::SCHEMA_VERSION;
 pub use options::ReadOptions;
 pub use output::AtomicFile;

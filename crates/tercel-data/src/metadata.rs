@@ -56,7 +56,7 @@ impl Metadata {
             |problem: String, help: String| DataError::Metadata { file: Arc::clone(file), problem, help };
         let value: serde_json::Value = serde_json::from_str(json).map_err(|error| {
             bad(
-                format!("what is not JSON: {error}"),
+                format!("there is what is not JSON: {error}"),
                 "remove the line if the file was made by hand".to_owned(),
             )
         })?;
@@ -65,7 +65,9 @@ impl Metadata {
             && version > u64::from(SCHEMA_VERSION)
         {
             return Err(bad(
-                format!("schema version {version}; this program reads versions up to {SCHEMA_VERSION}"),
+                format!(
+                    "the schema version is {version}; this program reads versions up to {SCHEMA_VERSION}"
+                ),
                 "update Tercel, or write the file with this version".to_owned(),
             ));
         }
@@ -74,13 +76,13 @@ impl Metadata {
         })?;
         if metadata.table != table {
             return Err(bad(
-                format!("that this is a table of `{}`; expected `{table}`", metadata.table),
+                format!("the table is `{}`; expected `{table}`", metadata.table),
                 format!("give the {table} file here"),
             ));
         }
         match metadata.origin {
             Some(origin) if !plausible(origin) => Err(bad(
-                format!("the origin is at {}, {}", origin.latitude, origin.longitude),
+                format!("the origin is at latitude {} and longitude {}", origin.latitude, origin.longitude),
                 "latitude and longitude of the origin are radians, the altitude is m".to_owned(),
             )),
             _ => Ok(metadata),

@@ -109,13 +109,13 @@ impl<R: BufRead> Scans<R> {
         }
         match object.get(LIST) {
             None => {
-                self.check_keys(object)?;
+                self.check_keys(object, line)?;
                 let numbered = self.next_id;
                 let row = self.row(object, object, line)?;
                 self.take_row(row, numbered, line)
             }
             Some(Value::Array(list)) => {
-                self.check_keys(object)?;
+                self.check_keys(object, line)?;
                 let scan = self.whole(object, list, line)?;
                 match self.open.take() {
                     Some((before, _)) => {
@@ -143,14 +143,15 @@ impl<R: BufRead> Scans<R> {
     }
 
     /// Refuses keys that are almost columns: without them a line may look like an empty scan.
-    fn check_keys(&mut self, object: &Map<String, Value>) -> Result<(), DataError> {
+    fn check_keys(&mut self, object: &Map<String, Value>, line: u64) -> Result<(), DataError> {
         /// A stream with more strange keys than this is not worth remembering.
         const REMEMBERED: usize = 256;
         for key in object.keys() {
             if key == LIST || self.sheet.position(key).is_some() || self.strangers.contains(key) {
                 continue;
             }
-            if let Some(error) = near_miss(key, &self.sheet.columns, self.lines.file()) {
+            if let Some(error) = near_miss(key, &self.sheet.columns, || Place::line(self.lines.file(), line))
+            {
                 return Err(error);
             }
             if self.strangers.len() < REMEMBERED {
@@ -208,7 +209,7 @@ impl<R: BufRead> Scans<R> {
                     "give a list of objects",
                 ));
             };
-            self.check_keys(detection)?;
+            self.check_keys(detection, line)?;
             let numbered = self.next_id;
             let row = self.row(detection, object, line)?;
             if row.detection.is_none() {

@@ -1,5 +1,8 @@
 //! What the errors say: where, what, what was expected, and what helps.
 
+// The exception for tests covers only the test functions themselves, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 use std::fmt::Write as _;
 
 use tercel_data::ndjson::Scans;
@@ -180,7 +183,7 @@ fn parquet_files() {
     assert!(cut.starts_with("radar.parquet: this is not a whole Parquet file: "), "{cut}");
     let tracks = read_tracks_from(bytes.as_slice(), Format::Parquet, "radar.parquet", &options);
     insta::assert_snapshot!(told(&tracks.unwrap_err()), @r"
-    radar.parquet: the description of the table says that this is a table of `detections`; expected `tracks`
+    radar.parquet: in the description of the table, the table is `detections`; expected `tracks`
       help: give the tracks file here
     ");
 }

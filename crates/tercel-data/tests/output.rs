@@ -1,5 +1,8 @@
 //! Files appear whole or not at all.
 
+// The exception for tests covers only the test functions themselves, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use std::io::Write;
 use std::path::Path;
 

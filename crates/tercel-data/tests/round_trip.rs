@@ -1,5 +1,8 @@
 //! What is written is read back to the last bit, in every format.
 
+// The exception for tests covers only the test functions themselves, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use proptest::prelude::*;

@@ -28,7 +28,7 @@ pub(crate) fn read<T: Layout>(
     let mut lines = Lines::new(reader, Arc::clone(file));
     let mut described = None;
     let mut first = None;
-    while let Some(row) = lines.next() {
+    for row in lines.by_ref() {
         let (object, line) = row?;
         match description(&object) {
             Some(json) => described = Some(Metadata::parse(&json, T::TABLE, file)?),

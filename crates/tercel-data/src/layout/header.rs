@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use crate::column::Column;
-use crate::error::DataError;
+use crate::error::{DataError, Place};
 
 /// For each column that the file has, where it stands there.
 ///
@@ -18,7 +18,7 @@ pub(crate) fn match_header(
     let mut seen = HashSet::new();
     if let Some(twice) = found.iter().find(|name| !seen.insert(name.as_str())) {
         return Err(DataError::Column {
-            file: Arc::clone(file),
+            place: Place::whole(file),
             column: twice.clone(),
             problem: "is there twice",
             help: "rename or remove one of them".to_owned(),
@@ -38,7 +38,9 @@ pub(crate) fn match_header(
         return Err(missing_columns(file, &missing, found));
     }
     let absent: Vec<Column> = columns.iter().filter(absent).cloned().collect();
-    if let Some(slip) = strangers.iter().find_map(|stranger| near_miss(stranger, &absent, file)) {
+    if let Some(slip) =
+        strangers.iter().find_map(|stranger| near_miss(stranger, &absent, || Place::whole(file)))
+    {
         return Err(slip);
     }
     Ok(columns
@@ -48,10 +50,14 @@ pub(crate) fn match_header(
 }
 
 /// The error for a column that is not known but almost one of these, if it is.
-pub(crate) fn near_miss(stranger: &str, columns: &[Column], file: &Arc<str>) -> Option<DataError> {
+pub(crate) fn near_miss(
+    stranger: &str,
+    columns: &[Column],
+    place: impl FnOnce() -> Place,
+) -> Option<DataError> {
     let meant = columns.iter().find(|column| nearest(&column.name, &[stranger]).is_some())?;
     Some(DataError::Column {
-        file: Arc::clone(file),
+        place: place(),
         column: stranger.to_owned(),
         problem: "is not known",
         help: format!("did you mean `{}`?", meant.name),

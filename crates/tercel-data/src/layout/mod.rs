@@ -81,7 +81,10 @@ impl<'a, const N: usize> Group<'a, N> {
         if known < N {
             return Err(DataError::Row {
                 place: place(),
-                problem: format!("of the columns {} only {known} have a value", self.names.join(", ")),
+                problem: format!(
+                    "of the columns {} some have a value and some have none",
+                    self.names.join(", ")
+                ),
                 help: "give all of them or none",
             });
         }
