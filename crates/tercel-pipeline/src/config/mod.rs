@@ -5,6 +5,7 @@
 mod filter;
 mod motion;
 mod number;
+pub mod presets;
 mod sensor;
 mod tracker;
 
