@@ -133,6 +133,10 @@ fn other_tables() {
             ("unknown status", "time,track,status,x,y\n0,1,dead,1,2\n"),
             ("existence in percent", "time,track,existence,x,y\n0,1,98,1,2\n"),
             ("half a covariance", "time,track,x,y,cov_x_x,cov_x_y,cov_y_y\n0,1,1,2,4,,4\n"),
+            (
+                "components of one name",
+                "# tercel: {\"schema\":1,\"table\":\"tracks\",\"labels\":[\"x\",\"y\",\"x\"]}\ntime,track,x,y\n0,1,1,2\n",
+            ),
             ("mode without probability", "time,track,x,y,mode_turn\n0,1,1,2,\n"),
         ],
         |content| read_tracks_from(content.as_bytes(), Format::Csv, "tracks.csv", &options),

@@ -120,8 +120,8 @@ fn a_table_without_rows_is_a_table() {
 
 #[test]
 fn numbers_of_other_types_in_parquet_are_understood() {
-    use arrow::array::TimestampMicrosecondArray;
-    use arrow::array::{ArrayRef, Float32Array, Float64Array, Int64Array, LargeStringArray, RecordBatch};
+    use arrow_array::TimestampMicrosecondArray;
+    use arrow_array::{ArrayRef, Float32Array, Float64Array, Int64Array, LargeStringArray, RecordBatch};
     use std::sync::Arc;
     let columns: Vec<(&str, ArrayRef)> = vec![
         ("time", Arc::new(TimestampMicrosecondArray::from(vec![1_500_000, 2_000_000]).with_timezone("UTC"))),

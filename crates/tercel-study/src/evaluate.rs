@@ -101,7 +101,11 @@ impl Evaluation {
 ///
 /// # Errors
 /// When an option is out of range or a position is not finite.
-pub fn evaluate(tracks: &Tracks, truths: &Truths, options: &EvaluateOptions) -> Result<Evaluation, FilterError> {
+pub fn evaluate(
+    tracks: &Tracks,
+    truths: &Truths,
+    options: &EvaluateOptions,
+) -> Result<Evaluation, FilterError> {
     let gospa = Gospa::new(options.cutoff, options.order)?;
     let ospa = Ospa::new(options.cutoff, options.order)?;
     let (objects, lines) = (timeline::of_truths(truths), timeline::of_tracks(tracks));
@@ -189,7 +193,10 @@ impl Picture {
 
     fn tracks_within(&self, near: f64) -> Vec<[f64; 2]> {
         let distances = self.nearest_object();
-        (0..self.tracks.len()).filter(|&track| distances[track] <= near).map(|track| self.tracks[track]).collect()
+        (0..self.tracks.len())
+            .filter(|&track| distances[track] <= near)
+            .map(|track| self.tracks[track])
+            .collect()
     }
 }
 
@@ -215,7 +222,9 @@ impl Holders {
         for object in order {
             let held = self.last[picture.object_ids[object]];
             let track = held.and_then(|id| picture.track_ids.iter().position(|&track| track == id));
-            if let Some(track) = track.filter(|&track| free[track] && picture.distance(object, track) <= cutoff) {
+            if let Some(track) =
+                track.filter(|&track| free[track] && picture.distance(object, track) <= cutoff)
+            {
                 joined[object] = Some(track);
                 free[track] = false;
             }
@@ -225,7 +234,9 @@ impl Holders {
             free[track] = false;
         }
         let mut switches = 0;
-        for (object, track) in joined.iter().enumerate().filter_map(|(object, track)| Some((object, (*track)?))) {
+        for (object, track) in
+            joined.iter().enumerate().filter_map(|(object, track)| Some((object, (*track)?)))
+        {
             let (id, track) = (picture.object_ids[object], picture.track_ids[track]);
             switches += usize::from(self.last[id].is_some_and(|last| last != track));
             self.last[id] = Some(track);
@@ -243,7 +254,8 @@ fn nearest_pair(
     free: &[bool],
 ) -> Option<(usize, usize)> {
     let objects = (0..joined.len()).filter(|&object| joined[object].is_none());
-    let pairs = objects.flat_map(|object| (0..free.len()).filter(|&t| free[t]).map(move |track| (object, track)));
+    let pairs =
+        objects.flat_map(|object| (0..free.len()).filter(|&t| free[t]).map(move |track| (object, track)));
     pairs
         .map(|(object, track)| (picture.distance(object, track), object, track))
         .filter(|pair| pair.0 <= cutoff)
@@ -306,7 +318,11 @@ fn pieces(times: &[f64], at: impl Fn(f64) -> Option<[f64; 2]>) -> Vec<Trajectory
     pieces.into_iter().map(|(start, positions)| Trajectory::new(start, positions)).collect()
 }
 
-fn means(instants: &[Instant], errors: &Errors, (tgospa, tgospa_switches): (f64, f64)) -> Vec<(&'static str, f64)> {
+fn means(
+    instants: &[Instant],
+    errors: &Errors,
+    (tgospa, tgospa_switches): (f64, f64),
+) -> Vec<(&'static str, f64)> {
     let count = instants.len().max(1) as f64;
     let mean = |value: fn(&Instant) -> f64| instants.iter().map(value).sum::<f64>() / count;
     let objects: usize = instants.iter().map(|instant| instant.objects).sum();

@@ -23,6 +23,9 @@ pub(crate) fn read<T: Layout>(
     let mut rows = Rows::new(reader, file, skipped)?;
     // Files of other programs often have blanks after their commas; in our own every blank belongs to a name.
     let trim = described.is_none();
+    if trim {
+        rows.header.iter_mut().for_each(|name| *name = name.trim().to_owned());
+    }
     let plan = Plan::new::<T>(&rows.header, described, file, options)?;
     let mut sheet = plan.sheet();
     while let Some((record, line)) = rows.next(file)? {
@@ -82,8 +85,8 @@ impl<'a> Rows<'a> {
         let mut reader = csv::ReaderBuilder::new().from_reader(reader);
         let header = reader.byte_headers().map_err(|error| failure(error, file, skipped))?;
         let header: Vec<String> =
-            header.iter().map(|name| String::from_utf8_lossy(name).trim().to_owned()).collect();
-        if header.iter().all(String::is_empty) {
+            header.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+        if header.iter().all(|name| name.trim().is_empty()) {
             return Err(DataError::Corrupt {
                 place: Place::line(file, skipped + 1),
                 problem: "there is no header".to_owned(),

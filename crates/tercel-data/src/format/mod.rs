@@ -5,6 +5,7 @@ mod guard;
 pub(crate) mod json;
 pub(crate) mod parquet;
 
+use std::collections::HashSet;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
@@ -117,6 +118,7 @@ impl Plan {
     ) -> Result<Self, DataError> {
         let metadata = described.unwrap_or_else(|| T::guess(found));
         let columns = options.relaxed(T::columns(&metadata));
+        no_repetition(&columns, file)?;
         metadata.check_units(&columns, options.angles, file)?;
         let columns = match_header(found, columns, file)?;
         Ok(Plan { metadata, columns })
@@ -124,6 +126,20 @@ impl Plan {
 
     pub fn sheet(&self) -> Sheet {
         Sheet::new(self.columns.iter().map(|(_, column)| column.clone()).collect())
+    }
+}
+
+/// Refuses names of components and modes that make two columns one.
+fn no_repetition(columns: &[Column], file: &Arc<str>) -> Result<(), DataError> {
+    let mut names = HashSet::new();
+    match columns.iter().find(|column| !names.insert(column.name.as_ref())) {
+        None => Ok(()),
+        Some(twice) => Err(DataError::Column {
+            place: Place::whole(file),
+            column: twice.name.to_string(),
+            problem: "would be there twice",
+            help: "give components and modes of the state names of their own".to_owned(),
+        }),
     }
 }
 
@@ -169,15 +185,7 @@ impl<W: Write + Send> SheetWriter<W> {
         metadata: Metadata,
         file: &Arc<str>,
     ) -> Result<Self, DataError> {
-        let mut names = std::collections::HashSet::new();
-        if let Some(twice) = columns.iter().find(|column| !names.insert(column.name.as_ref())) {
-            return Err(DataError::Column {
-                place: Place::whole(file),
-                column: twice.name.to_string(),
-                problem: "would be there twice",
-                help: "give components and modes of the state names of their own".to_owned(),
-            });
-        }
+        no_repetition(columns, file)?;
         let json = metadata.with_units(columns).to_json();
         Ok(match format {
             Format::Csv => SheetWriter::Csv(Box::new(csv::Writer::new(sink, columns, &json, file)?)),

@@ -122,7 +122,7 @@ pub fn tracks() -> impl Strategy<Value = Tracks> {
     (origin(), 0..3_usize, 0..3_usize).prop_flat_map(|(origin, state, modes)| {
         let labels: Vec<String> = STATES[state].iter().map(|label| (*label).to_owned()).collect();
         let modes: Vec<String> =
-            ["straight", "turn, \"left\""][..modes].iter().map(|m| (*m).to_owned()).collect();
+            ["straight", "turn, \"left\" "][..modes].iter().map(|m| (*m).to_owned()).collect();
         vec(track(labels.len(), modes.len()), 0..5).prop_map(move |rows| Tracks {
             origin,
             labels: labels.clone(),
