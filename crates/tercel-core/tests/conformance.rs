@@ -1,5 +1,7 @@
 //! Every filter of the crate passes the conformance suite.
 
+#![allow(clippy::unwrap_used)]
+
 #[path = "conformance/polar.rs"]
 mod polar;
 
