@@ -1,5 +1,7 @@
 //! Time of one step (predict and update) of each filter: `cargo bench -p tercel-core --bench filters`.
 
+#![allow(clippy::unwrap_used)]
+
 use divan::{Bencher, black_box};
 use tercel_core::filter::{Extended, Filter, Imm, Kalman, Particle, Transition, Unscented};
 use tercel_core::motion::{ConstantVelocity, CoordinatedTurn, Turn};

@@ -7,6 +7,8 @@
 //! cargo bench -p tercel-core --features instructions --bench instructions
 //! ```
 
+#![allow(clippy::unwrap_used)]
+
 use std::hint::black_box;
 
 use gungraun::{library_benchmark, library_benchmark_group, main};

@@ -1,5 +1,7 @@
 //! No filter allocates memory in a step once it has warmed up.
 
+#![allow(clippy::unwrap_used)]
+
 use allocation_counter::measure;
 use tercel_core::belief::Gaussian;
 use tercel_core::filter::{Extended, Filter, Imm, Kalman, Padded, Particle, Transition, Unscented};

@@ -1,5 +1,7 @@
 //! Every filter of the crate passes the conformance suite.
 
+#![allow(clippy::unwrap_used)]
+
 #[path = "conformance/polar.rs"]
 mod polar;
 
@@ -82,7 +84,7 @@ fn smoothed(problem: &Problem, count: usize, seed: u64) -> Particle<ConstantVelo
 }
 
 /// Without smoothing few particles survive the first updates of a vague birth, and the filter is too sure of itself.
-const PLAIN: Expectations = Expectations { kalman: Some(1.0), consistent: false, ..Expectations::sampled() };
+const PLAIN: Expectations = Expectations { kalman: Some(1.0), consistent: None, ..Expectations::sampled() };
 
 conformance!(
     smoothed_particle_filter,
@@ -94,7 +96,7 @@ conformance!(
 );
 conformance!(
     imm_with_particles,
-    positions::<4, _, _>(Expectations::sampled(), |p| {
+    positions::<4, _, _>(Expectations { consistent: None, ..Expectations::sampled() }, |p| {
         Imm::new([1, 2].map(|seed| smoothed(p, 4000, seed)), Transition::sticky(0.9)).unwrap()
     })
 );

@@ -1,5 +1,7 @@
 //! Filters agree with reference vectors that an independent implementation computed (see `vectors/SOURCE.md`).
 
+#![allow(clippy::unwrap_used)]
+
 use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
 use serde_json::Value;
 use tercel_core::belief::Gaussian;

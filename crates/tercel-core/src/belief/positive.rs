@@ -284,6 +284,7 @@ mod tests {
     }
 
     #[test]
+    #[allow(clippy::excessive_precision)]
     fn a_matrix_at_the_edge_of_rounding_gets_one_verdict() {
         // The covariance of means that lie 1e14 apart: the order of operations decides whether it has a factor.
         let mut edge = matrix![

@@ -90,8 +90,8 @@ pub struct Expectations {
     /// It equals the Kalman filter on linear-Gaussian problems: largest root mean square difference of mean and covariance
     /// over time, in standard deviations.
     pub kalman: Option<f64>,
-    /// Its errors match its covariance: the mean NEES of 200 runs lies inside its 99 % bounds.
-    pub consistent: bool,
+    /// Its errors match its covariance: the mean NEES of this many objects lies inside its 99 % bounds.
+    pub consistent: Option<u64>,
     /// Two predictions equal one over the sum of the times: largest difference, in standard deviations.
     pub composes: Option<f64>,
     /// The moments of a merged belief, and those after `set_state`: largest difference, in standard deviations.
@@ -106,7 +106,7 @@ impl Expectations {
     pub const fn exact() -> Self {
         Expectations {
             kalman: Some(1e-9),
-            consistent: true,
+            consistent: Some(200),
             composes: Some(1e-9),
             moments: Some(1e-9),
             extremes: true,
@@ -117,7 +117,7 @@ impl Expectations {
     pub const fn sampled() -> Self {
         Expectations {
             kalman: Some(0.35),
-            consistent: true,
+            consistent: Some(100),
             composes: Some(0.15),
             moments: Some(1e-6),
             extremes: false,
@@ -126,7 +126,7 @@ impl Expectations {
 
     /// Of a filter with models of its own: only that covariances stay positive definite and that moments are kept.
     pub const fn own_models() -> Self {
-        Expectations { kalman: None, consistent: false, composes: None, moments: Some(1e-9), extremes: true }
+        Expectations { kalman: None, consistent: None, composes: None, moments: Some(1e-9), extremes: true }
     }
 }
 

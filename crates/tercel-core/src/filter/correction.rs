@@ -34,7 +34,7 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
             return Err(FilterError::NotFinite { what: "innovation" });
         }
         let jacobian = sensor.jacobian(&belief.mean);
-        let cross = belief.covariance * jacobian.transpose();
+        let cross = sensor.project(&belief.covariance, &jacobian);
         let factor = Cholesky::new(&(jacobian * cross + reading.noise), "innovation covariance")?;
         let nis = factor.mahalanobis(&residual);
         let innovation = Innovation::new(&residual, nis, factor.ln_density(nis));
@@ -43,12 +43,12 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
 
     /// Conditions the belief on the measurement, with the covariance in Joseph's form. On an error it stays as it was.
     #[inline(always)]
-    pub fn condition(&self, belief: &mut Gaussian<N>) -> Result<(), FilterError> {
+    pub fn condition(&self, sensor: &impl Sensor<N, M>, belief: &mut Gaussian<N>) -> Result<(), FilterError> {
         let gain = self.factor.right_solve(&self.cross);
         // (I - K H) P (I - K H)ᵀ + K R Kᵀ, with A = (I - K H) P = P - K (P Hᵀ)ᵀ computed once.
         let shrunk = belief.covariance - gain * self.cross.transpose();
         let mut covariance =
-            shrunk - (shrunk * self.jacobian.transpose() - gain * self.noise) * gain.transpose();
+            shrunk - (sensor.project(&shrunk, &self.jacobian) - gain * self.noise) * gain.transpose();
         positive::symmetrise(&mut covariance);
         let mean = belief.mean + gain * self.residual;
         if !positive::is_definite(&covariance) {
@@ -78,7 +78,7 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
 }
 
 /// The belief after `dt` by a motion, to first order.
-#[inline]
+#[inline(always)]
 pub(super) fn predicted<const N: usize>(
     motion: &impl Motion<N>,
     belief: &Gaussian<N>,

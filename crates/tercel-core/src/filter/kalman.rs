@@ -77,7 +77,7 @@ where
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         let comparison = Comparison::new(&self.sensor, belief, measurement)?;
-        comparison.condition(belief)?;
+        comparison.condition(&self.sensor, belief)?;
         Ok(comparison.innovation)
     }
 

@@ -174,3 +174,135 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         Ok(posterior)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::{Extended, Kalman};
+    use crate::motion::{ConstantVelocity, CoordinatedTurn};
+    use crate::sensor::{BearingOnly, Position, RangeBearing};
+    use nalgebra::{SMatrix, vector};
+    use proptest::prelude::*;
+
+    /// A sensor of the square of a position, whose moments are known.
+    struct Square;
+
+    impl Sensor<1, 1> for Square {
+        fn expected(&self, state: &SVector<f64, 1>) -> SVector<f64, 1> {
+            vector![state[0] * state[0]]
+        }
+        fn jacobian(&self, state: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+            SMatrix::from([[2.0 * state[0]]])
+        }
+        fn noise(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+            SMatrix::from([[0.5]])
+        }
+        fn birth(&self, _: &Measurement<1>, prior: &Gaussian<1>) -> Result<Gaussian<1>, FilterError> {
+            Ok(*prior)
+        }
+        fn place(&self, _: &Measurement<1>) -> Option<nalgebra::Vector2<f64>> {
+            None
+        }
+        fn spread(&self, _: &SVector<f64, 1>) -> Option<SMatrix<f64, 2, 2>> {
+            None
+        }
+    }
+
+    #[test]
+    fn the_moments_of_a_square_are_exact_for_any_spread_of_the_points() {
+        let (mean, variance) = (0.7, 2.0);
+        let belief = Gaussian::new(vector![mean], SMatrix::from([[variance]])).unwrap();
+        for (alpha, kappa) in [(1.0, 0.0), (1e-3, 0.0), (0.5, 2.0)] {
+            let filter: Unscented<_, _, 1> = Unscented::new(crate::motion::RandomWalk::new(1.0), Square)
+                .with_points(SigmaPoints::new(alpha, 2.0, kappa).unwrap());
+            let innovation = filter.innovation(&belief, &[3.0].into()).unwrap();
+            let residual = innovation.residual()[0];
+            assert!((residual - (3.0 - mean * mean - variance)).abs() < 1e-8, "{alpha} {residual}");
+            // The extra κ of the even part scales with the fourth moment, which is exact at κ = 0.
+            if kappa == 0.0 {
+                let spread = 4.0 * mean * mean * variance + 2.0 * variance * variance + 0.5;
+                assert!((innovation.nis * spread / (residual * residual) - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bearing_is_averaged_across_the_cut() {
+        let radar = RangeBearing::new(10.0, 0.01).unwrap();
+        let filter = Unscented::new(ConstantVelocity::new(1.0), radar);
+        let far = SMatrix::from_diagonal(&vector![100.0, 1e4, 1.0, 1.0]);
+        let mut belief = Gaussian::new(vector![-1000.0, 0.0, 0.0, 0.0], far).unwrap();
+        let innovation = filter.update(&mut belief, &[1005.0, -3.1].into()).unwrap();
+        assert!((innovation.residual()[1] - 0.0416).abs() < 1e-3, "{:?}", innovation.residual());
+        assert!(belief.mean[1] < -30.0);
+    }
+
+    #[test]
+    fn a_wide_cross_range_error_biases_the_extended_filter_more() {
+        // Range 1000 m, 200 m wide across: the mean range is longer than the range of the mean by 200²/2000 m.
+        let radar = RangeBearing::new(5.0, 0.01).unwrap();
+        let wide = SMatrix::from_diagonal(&vector![100.0, 4e4, 1.0, 1.0]);
+        let belief = Gaussian::new(vector![1000.0, 0.0, 0.0, 0.0], wide).unwrap();
+        let motion = ConstantVelocity::new(1.0);
+        let seen = [1020.0, 0.0].into();
+        let bent = Unscented::new(motion, radar).innovation(&belief, &seen).unwrap();
+        let straight = Extended::new(motion, radar).innovation(&belief, &seen).unwrap();
+        assert!(bent.residual()[0].abs() < 1.0 && straight.residual()[0] == 20.0, "{bent:?}");
+        assert!(bent.nis < straight.nis);
+    }
+
+    #[test]
+    fn a_step_that_keeps_its_points_is_the_filter_when_there_is_no_process_noise() {
+        let still = ConstantVelocity::new(0.0);
+        let filter = Unscented::new(still, RangeBearing::new(10.0, 0.01).unwrap());
+        let mut once: Gaussian<4> = filter.birth(&[1000.0, 0.3].into()).unwrap();
+        let before = once;
+        let mut twice = once;
+        assert!(filter.step(&mut once, 1.0, &[f64::NAN, 0.0].into()).is_err());
+        assert_eq!(once, before);
+        filter.step(&mut once, 0.0, &[1003.0, 0.31].into()).unwrap();
+        filter.predict(&mut twice, 0.0);
+        filter.update(&mut twice, &[1003.0, 0.31].into()).unwrap();
+        assert!((once.mean - twice.mean).norm() < 1e-9);
+        assert!((once.covariance - twice.covariance).norm() < 1e-9);
+    }
+
+    #[test]
+    fn linear_problems_are_the_kalman_filters_up_to_rounding_even_after_a_vague_birth() {
+        let (motion, radar) = (ConstantVelocity::new(0.1).with_speed(1e4), Position::<2>::new(1e-3).unwrap());
+        let (bent, exact) = (Unscented::new(motion, radar), Kalman::new(motion, radar));
+        let mut a: Gaussian<4> = bent.birth(&[0.0, 0.0].into()).unwrap();
+        let mut b = a;
+        for step in 1..50 {
+            let seen = [f64::from(step), 0.5].into();
+            bent.predict(&mut a, 1.0);
+            bent.update(&mut a, &seen).unwrap();
+            exact.predict(&mut b, 1.0);
+            exact.update(&mut b, &seen).unwrap();
+        }
+        assert!((a.covariance - b.covariance).norm() < 1e-6 * b.covariance.norm());
+    }
+
+    proptest! {
+        #[test]
+        fn no_parameters_and_no_belief_make_a_covariance_indefinite(
+            (alpha, beta, kappa) in (1e-3..2.0_f64, 0.0..3.0_f64, 0.0..3.0_f64),
+            mean in proptest::array::uniform5(-100.0..100.0_f64),
+            deviations in proptest::array::uniform5(1e-3..1e3_f64),
+            dt in 0.0..50.0_f64,
+            bearing in -3.0..3.0_f64,
+        ) {
+            let points = SigmaPoints::new(alpha, beta, kappa).unwrap();
+            let motion = CoordinatedTurn::new(0.0, 0.0);
+            let filter: Unscented<_, _, 1> =
+                Unscented::new(motion, BearingOnly::new(1e-3).unwrap()).with_points(points);
+            let square = SVector::from(deviations.map(|d| d * d));
+            let mut belief = Gaussian::new(SVector::from(mean), SMatrix::from_diagonal(&square)).unwrap();
+            filter.predict(&mut belief, dt);
+            let eigenvalues = belief.covariance.symmetric_eigenvalues();
+            prop_assert!(eigenvalues.min() >= -1e-12 * eigenvalues.max(), "predicted: {eigenvalues}");
+            filter.update(&mut belief, &[bearing].into()).unwrap();
+            prop_assert!(Cholesky::new(&belief.covariance, "posterior").is_ok());
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, vector};
 
 use super::range_bearing::{RangeBearing, cartesian, rotated};
-use super::{Measurement, Reading, Sensor, finite, placed};
+use super::{Measurement, Reading, Sensor, finite, picked, placed};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
@@ -115,6 +115,11 @@ impl<const N: usize> Sensor<N, 2> for ConvertedPolar {
             _ if j == i + 2 => -lag,
             _ => 0.0,
         })
+    }
+
+    #[inline]
+    fn project(&self, matrix: &SMatrix<f64, N, N>, _: &SMatrix<f64, 2, N>) -> SMatrix<f64, N, 2> {
+        picked(matrix, self.lag_of::<N>())
     }
 
     fn noise(&self, expected: &Vector2<f64>) -> Matrix2<f64> {

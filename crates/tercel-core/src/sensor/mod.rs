@@ -84,6 +84,14 @@ pub trait Sensor<const N: usize, const M: usize> {
     /// Derivative of [`expected`](Sensor::expected) with respect to the state.
     fn jacobian(&self, state: &SVector<f64, N>) -> SMatrix<f64, M, N>;
 
+    /// `A Hᵀ` for a matrix `A` and the [`jacobian`](Sensor::jacobian) `H`.
+    ///
+    /// Sensors whose Jacobian is mostly zeros override this to save the dense product.
+    #[inline]
+    fn project(&self, matrix: &SMatrix<f64, N, N>, jacobian: &SMatrix<f64, M, N>) -> SMatrix<f64, N, M> {
+        matrix * jacobian.transpose()
+    }
+
     /// Covariance of the reading's error for an object whose expected reading is `expected`.
     fn noise(&self, expected: &SVector<f64, M>) -> SMatrix<f64, M, M>;
 
@@ -189,6 +197,15 @@ pub fn wrapped(angle: f64) -> f64 {
     let turned = (angle + PI).rem_euclid(TAU) - PI;
     // Rounding in the remainder may leave the interval by one unit in the last place.
     turned.clamp(-PI, PI)
+}
+
+/// `A Hᵀ` for a sensor that picks the first `M` components, less `lag` times the `M` after them.
+#[inline]
+fn picked<const N: usize, const M: usize>(matrix: &SMatrix<f64, N, N>, lag: f64) -> SMatrix<f64, N, M> {
+    if lag == 0.0 {
+        return matrix.fixed_columns::<M>(0).into_owned();
+    }
+    SMatrix::from_fn(|i, j| matrix[(i, j)] - lag * matrix[(i, j + M)])
 }
 
 /// A birth with the position part of `prior` replaced by a position in the plane and its covariance, and everything

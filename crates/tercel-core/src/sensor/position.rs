@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::{Measurement, Sensor, finite};
+use super::{Measurement, Sensor, finite, picked};
 use crate::belief::{Cholesky, Gaussian};
 use crate::error::FilterError;
 
@@ -80,6 +80,11 @@ impl<const N: usize, const M: usize> Sensor<N, M> for Position<M> {
             _ if j == i + M => -lag,
             _ => 0.0,
         })
+    }
+
+    #[inline]
+    fn project(&self, matrix: &SMatrix<f64, N, N>, _: &SMatrix<f64, M, N>) -> SMatrix<f64, N, M> {
+        picked(matrix, self.lag_of::<N>())
     }
 
     #[inline]
