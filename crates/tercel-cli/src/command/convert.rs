@@ -1,0 +1,169 @@
+//! `tercel convert`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap::error::ErrorKind;
+use tercel_data::table::{Origin, Truths};
+use tercel_data::{AtomicFile, Format, ImportOptions, Imported, write_detections_to, write_truths_to};
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::input::{ReadArguments, is_stdin, note_left_out};
+use crate::output::{STDOUT, Target};
+use crate::summary::counted;
+
+/// Bring recordings of other programs into the tables.
+///
+/// Writes the table of detections and, with --truth-out, what the recording knows of the truth: the file beside an Autoferry
+/// recording, the positions that aircraft and ships broadcast of themselves. Several files of one kind become one table in
+/// the order of time.
+#[derive(Debug, Args)]
+#[command(after_long_help = AFTER)]
+pub struct ConvertArguments {
+    /// The recording; - is standard input (tables only). Several files of one kind are joined.
+    #[arg(required = true)]
+    input: Vec<PathBuf>,
+    /// Table of detections to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON).
+    #[arg(long, short, value_name = "FILE", default_value = "-", value_parser = Target::parse)]
+    output: Target,
+    /// Table of the truth to write (.csv, .parquet, .ndjson).
+    #[arg(long, value_name = "FILE", value_parser = Target::parse)]
+    truth_out: Option<Target>,
+    #[command(flatten)]
+    read: ReadArguments,
+    /// Origin of the local frame for geographic recordings, degrees and m; without it, the median position.
+    #[arg(long, value_name = "LAT,LON[,ALT]", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<Origin>,
+    /// Keep reports that repeat a position (adsb, ais).
+    #[arg(long)]
+    keep_repeated: bool,
+    /// Keep the time of a report where the time of its position is known (adsb).
+    #[arg(long)]
+    reported_time: bool,
+    /// Take an aircraft with another callsign for another object (adsb).
+    #[arg(long)]
+    split_callsigns: bool,
+}
+
+const AFTER: &str = "\
+Examples:
+  tercel convert scenario2_detections.json.gz -o radar.parquet --truth-out truth.parquet
+  tercel convert --from adsb states.csv --origin 47.46,8.55,432 -o aircraft.csv
+  tercel convert radar.csv --angles degrees | tercel track -";
+
+impl ConvertArguments {
+    /// Reads the recording and writes its tables.
+    pub fn run(&self, console: &Console) -> Result<(), Failure> {
+        self.check()?;
+        let source = self.read.source(&self.input[0])?;
+        let options = ImportOptions {
+            origin: self.origin,
+            truths: true,
+            keep_repeated: self.keep_repeated,
+            reported_time: self.reported_time,
+            split_callsigns: self.split_callsigns,
+            ..ImportOptions::default()
+        };
+        let imported = self.read.import(source, &self.input, options, console)?;
+        note_left_out(&imported, console);
+        let written = self.write(&imported)?;
+        let scans = imported.detections.scans.len() as u64;
+        let detections: usize = imported.detections.scans.iter().map(|scan| scan.detections.len()).sum();
+        console.note(format_args!(
+            "{}: {}, {}",
+            source.name(),
+            counted(scans, "scan"),
+            counted(detections as u64, "detection")
+        ));
+        if let (Some(truths), false) = (&imported.truths, written) {
+            let rows = counted(truths.rows.len() as u64, "row");
+            console.note(format_args!("the recording has a truth of {rows}; --truth-out FILE writes it"));
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        let conflict = |message: &str| Err(Failure::usage(ErrorKind::ArgumentConflict, message));
+        match &self.truth_out {
+            Some(Target::Stdout) => return conflict("--truth-out needs a file"),
+            Some(truth) if *truth == self.output => return conflict("-o and --truth-out name the same file"),
+            _ => {}
+        }
+        if self.input.len() > 1 && self.input.iter().any(|path| is_stdin(path)) {
+            return conflict("standard input cannot be joined with files");
+        }
+        Ok(())
+    }
+
+    /// Writes the tables; all of them are complete before the first one appears. True when the truth is among them.
+    fn write(&self, imported: &Imported) -> Result<bool, Failure> {
+        let truth = match self.truth_out.as_ref().and_then(Target::file) {
+            Some(path) => Some(truth_file(path, imported.truths.as_ref())?),
+            None => None,
+        };
+        match &self.output {
+            Target::Stdout => {
+                write_detections_to(std::io::stdout(), Format::Ndjson, STDOUT, &imported.detections)?;
+                std::io::stdout().flush().map_err(|error| Failure::stdout(&error))?;
+            }
+            Target::File(path) => {
+                let mut file = AtomicFile::create(path)?;
+                let format = Format::of(path)?;
+                write_detections_to(&mut file, format, &path.to_string_lossy(), &imported.detections)?;
+                file.finish()?;
+            }
+        }
+        let written = truth.is_some();
+        truth.map_or(Ok(()), AtomicFile::finish)?;
+        Ok(written)
+    }
+}
+
+fn truth_file(path: &Path, truths: Option<&Truths>) -> Result<AtomicFile, Failure> {
+    let Some(truths) = truths else {
+        return Err(Failure::input("the recording has no truth").with_help("leave out --truth-out"));
+    };
+    let mut file = AtomicFile::create(path)?;
+    write_truths_to(&mut file, Format::of(path)?, &path.to_string_lossy(), truths)?;
+    Ok(file)
+}
+
+fn origin(text: &str) -> Result<Origin, String> {
+    let wrong =
+        || "expected degrees north and east, and possibly m above the ellipsoid: 47.46,8.55,432".to_owned();
+    let numbers: Vec<f64> =
+        text.split(',').map(|part| part.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    let (latitude, longitude, altitude) = match numbers[..] {
+        [latitude, longitude] => (latitude, longitude, 0.0),
+        [latitude, longitude, altitude] => (latitude, longitude, altitude),
+        _ => return Err(wrong()),
+    };
+    if !(latitude.abs() <= 90.0 && longitude.abs() <= 180.0 && altitude.is_finite()) {
+        return Err(wrong());
+    }
+    Ok(Origin { latitude: latitude.to_radians(), longitude: longitude.to_radians(), altitude })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::origin;
+
+    #[test]
+    fn an_origin_is_degrees_and_metres() {
+        let place = origin("47.5, 8.25,432").unwrap();
+        assert_eq!(
+            (place.latitude, place.longitude, place.altitude),
+            (47.5_f64.to_radians(), 8.25_f64.to_radians(), 432.0)
+        );
+        assert_eq!(origin("-33.9,18.4").unwrap().altitude, 0.0);
+    }
+
+    #[test]
+    fn an_origin_beyond_the_earth_is_refused() {
+        for text in ["91,0", "0,181", "NaN,0", "1", "1,2,3,4", "1,2,inf", "north,east"] {
+            assert!(origin(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! `tercel evaluate`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+use tercel_data::table::{Metric, Metrics};
+use tercel_data::{Format, ReadOptions, read_detections, read_tracks, write_metrics, write_metrics_to};
+use tercel_study::evaluate::Evaluation;
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::input;
+use crate::output::{STDOUT, Target, print, print_json};
+use crate::score::ScoreArguments;
+use crate::summary::Table;
+
+/// Score tracks against the truth.
+///
+/// Confirmed and coasted tracks are compared with the true objects at every time of the tracks at which the truth is known.
+/// A scan that left no track at all leaves no row: name the detections with --scans, so that such scans count as well.
+#[derive(Debug, Args)]
+#[command(after_long_help = AFTER)]
+pub struct EvaluateArguments {
+    /// Tracks (.csv, .parquet, .ndjson); those of other programs need the columns time, track, x and y.
+    tracks: PathBuf,
+    /// Truth (.csv, .parquet, .ndjson, or the truth file of an Autoferry recording).
+    #[arg(long, value_name = "FILE")]
+    truth: PathBuf,
+    /// Detections at whose scans the tracks are scored, instead of the times of the tracks.
+    #[arg(long, value_name = "FILE")]
+    scans: Option<PathBuf>,
+    /// Write the scores as a table (.csv, .parquet, .ndjson; - is standard output).
+    #[arg(long, short, value_name = "FILE", value_parser = Target::parse)]
+    output: Option<Target>,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    score: ScoreArguments,
+}
+
+const AFTER: &str = "\
+Examples:
+  tercel evaluate tracks.parquet --truth truth.csv
+  tercel evaluate tracks.csv --truth truth.csv --scans radar.csv --cutoff 50 -o metrics.csv
+  tercel evaluate tracks.csv --truth truth.csv --json | jq .scores.metrics.gospa";
+
+impl EvaluateArguments {
+    /// Scores the tracks.
+    pub fn run(&self, console: &Console) -> Result<(), Failure> {
+        if self.json && self.output == Some(Target::Stdout) {
+            let message = "--json and -o - both write to standard output";
+            return Err(Failure::usage(clap::error::ErrorKind::ArgumentConflict, message));
+        }
+        let tracks = read_tracks(&self.tracks, &ReadOptions::default())?;
+        let truths = input::truth(&self.truth)?;
+        let times = match &self.scans {
+            Some(path) => {
+                let detections = read_detections(path, &ReadOptions::default())?;
+                Some(detections.scans.iter().map(|scan| scan.time).collect())
+            }
+            None => None,
+        };
+        let evaluation = self.score.evaluate(&tracks, &truths, times, console)?;
+        if evaluation.instants.is_empty() {
+            console.warn("there is no time at which both tracks and truth are known");
+        }
+        match &self.output {
+            Some(Target::File(path)) => write_metrics(path, &self.metrics(&evaluation))?,
+            Some(Target::Stdout) => {
+                let metrics = self.metrics(&evaluation);
+                return Ok(write_metrics_to(std::io::stdout(), Format::Ndjson, STDOUT, &metrics)?);
+            }
+            None => {}
+        }
+        if self.json {
+            return print_json(&json!({
+                "tracks": self.tracks.to_string_lossy(),
+                "truth": self.truth.to_string_lossy(),
+                "scores": self.score.json(&evaluation),
+            }));
+        }
+        let mut table = Table::default();
+        table.heading(self.score.heading(&evaluation));
+        table.scores(&evaluation);
+        print(&table.render())
+    }
+
+    fn metrics(&self, evaluation: &Evaluation) -> Metrics {
+        let row = |(name, value): &(&'static str, f64)| Metric {
+            study: "evaluate".to_owned(),
+            method: self.tracks.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            run: self.truth.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            metric: (*name).to_owned(),
+            component: String::new(),
+            value: *value,
+        };
+        Metrics { rows: evaluation.means.iter().map(row).collect() }
+    }
+}

@@ -1,0 +1,181 @@
+//! What is said and written when tracking is over.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use tercel_data::table::Truths;
+use tercel_pipeline::Config;
+use tercel_study::evaluate::Evaluation;
+use tercel_study::report::{self, Chart, Form, Picture, Report, SensorNote};
+
+use super::TrackArguments;
+use super::run::Run;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::output::{Target, print, print_json};
+use crate::progress::Progress;
+use crate::summary::{Table, count, counted, score};
+
+/// A run that came to its end.
+pub struct Outcome {
+    /// The tracker and what it did.
+    pub run: Run,
+    /// What was really there, if it is known.
+    pub truths: Option<Truths>,
+    /// How the tracker was described.
+    pub config: Config,
+    /// Name of the configuration.
+    pub configuration: String,
+    /// Lines and scans of standard input that could not be used.
+    pub bad: u64,
+}
+
+impl Outcome {
+    /// Scores the tracks, puts the outputs in their places and prints the summary.
+    pub fn write(mut self, arguments: &TrackArguments, console: &Console) -> Result<(), Failure> {
+        let evaluation = match &self.truths {
+            Some(truths) => {
+                let times = self.run.seen.scans.iter().map(|scan| scan.time).collect();
+                Some(arguments.score.evaluate(&self.run.tracks, truths, Some(times), console)?)
+            }
+            None => None,
+        };
+        let evaluation = evaluation.as_ref();
+        if let Some(path) = &arguments.report {
+            let _progress = Progress::spinner(console, "writing the report");
+            self.report(arguments, evaluation)?.write(path)?;
+        }
+        self.run.finish()?;
+        if arguments.json {
+            return print_json(&self.json(arguments, evaluation));
+        }
+        let table = self.table(arguments, evaluation).render();
+        match arguments.target() {
+            // Standard output has the tracks, so that the summary goes where notes go.
+            Some(Target::Stdout) => console.text(&table),
+            _ => print(&table)?,
+        }
+        Ok(())
+    }
+
+    /// Names and values of the figures that need no truth.
+    fn figures(&self) -> Vec<(&'static str, String)> {
+        let summary = self.run.summary();
+        let mut scans = format!("{} tracked, {} late", count(summary.scans), count(summary.late));
+        if summary.ignored > 0 {
+            scans.push_str(&format!(", {} of ignored sensors", count(summary.ignored)));
+        }
+        if self.bad > 0 {
+            scans.push_str(&format!(", {} could not be used", count(self.bad)));
+        }
+        let detections = summary.updates + summary.starts + summary.clutter;
+        let uses = format!(
+            "{}: {} updated a track, {} started one, {} clutter",
+            count(detections),
+            count(summary.updates),
+            count(summary.starts),
+            count(summary.clutter)
+        );
+        vec![
+            ("scans", scans),
+            ("detections", uses),
+            ("tracks", format!("{} confirmed", count(summary.confirmed))),
+            (
+                "speed",
+                self.speed().map_or("-".to_owned(), |speed| format!("{} scans/s", count(speed as u64))),
+            ),
+        ]
+    }
+
+    /// Scans per second of the tracker itself.
+    fn speed(&self) -> Option<f64> {
+        let speed = self.run.summary().scans as f64 / self.run.seconds();
+        speed.is_finite().then_some(speed)
+    }
+
+    fn table(&self, arguments: &TrackArguments, evaluation: Option<&Evaluation>) -> Table {
+        let mut table = Table::default();
+        for (name, value) in self.figures() {
+            table.figure(name, value);
+        }
+        if let Some(evaluation) = evaluation {
+            table.heading(arguments.score.heading(evaluation));
+            table.scores(evaluation);
+        }
+        table
+    }
+
+    fn json(&self, arguments: &TrackArguments, evaluation: Option<&Evaluation>) -> Value {
+        let summary = self.run.summary();
+        let target = arguments.target();
+        let path = |path: Option<&Path>| path.map(|path| path.to_string_lossy().into_owned());
+        json!({
+            "input": arguments.input.to_string_lossy(),
+            "configuration": self.configuration,
+            "scans": {
+                "read": self.run.scans,
+                "tracked": summary.scans,
+                "late": summary.late,
+                "ignored": summary.ignored,
+                "bad": self.bad,
+            },
+            "detections": {
+                "tracked": summary.updates + summary.starts + summary.clutter,
+                "updated": summary.updates,
+                "started": summary.starts,
+                "clutter": summary.clutter,
+                "left_out": self.run.left_out,
+            },
+            "confirmed_tracks": summary.confirmed,
+            "seconds": self.run.seconds(),
+            "scans_per_second": self.speed(),
+            "scores": evaluation.map(|evaluation| arguments.score.json(evaluation)),
+            "outputs": {
+                "tracks": path(target.as_ref().and_then(Target::file)),
+                "report": path(arguments.report.as_deref()),
+            },
+        })
+    }
+
+    fn report(&self, arguments: &TrackArguments, evaluation: Option<&Evaluation>) -> Result<Report, Failure> {
+        let mut summary = report::Summary::new();
+        for (name, value) in self.figures() {
+            summary = summary.with(name, value, None);
+        }
+        for (name, value) in evaluation.iter().flat_map(|evaluation| &evaluation.means) {
+            summary = summary.with(*name, score(name, *value), None);
+        }
+        let sensors: Vec<SensorNote> = self
+            .config
+            .sensors
+            .iter()
+            .map(|(name, sensor)| SensorNote {
+                sensor: name.clone(),
+                label: None,
+                position: Some(sensor.position),
+            })
+            .collect();
+        let mut picture = Picture::new(&self.run.seen, &self.run.tracks, self.truths.as_ref(), &sensors)?;
+        if let Some(evaluation) = evaluation {
+            picture = picture.with_chart(gospa(evaluation));
+        }
+        let title = arguments.input.file_name().unwrap_or(arguments.input.as_os_str()).to_string_lossy();
+        let scans = counted(self.run.summary().scans, "scan");
+        Ok(Report::new(title)
+            .with_subtitle(format!("Configuration {}; {scans}", self.configuration))
+            .with(summary)
+            .with(picture))
+    }
+}
+
+/// The parts of GOSPA over time.
+fn gospa(evaluation: &Evaluation) -> Chart {
+    let column = |value: fn(&tercel_study::evaluate::Instant) -> f64| -> Vec<f64> {
+        evaluation.instants.iter().map(value).collect()
+    };
+    Chart::over_time("GOSPA", "m", column(|instant| instant.time))
+        .with_form(Form::Stacked)
+        .with_part("localisation", column(|instant| instant.localisation))
+        .with_part("missed", column(|instant| instant.missed))
+        .with_part("false", column(|instant| instant.false_alarm))
+}

@@ -1,0 +1,63 @@
+//! Standard output and output files.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use tercel_data::{AtomicFile, Format};
+
+use crate::failure::Failure;
+
+/// Name of standard output in messages.
+pub const STDOUT: &str = "standard output";
+
+/// Where a table goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Target {
+    /// Standard output, as NDJSON.
+    Stdout,
+    /// A file; its name tells the format.
+    File(PathBuf),
+}
+
+impl Target {
+    /// Reads an argument, `-` for standard output, and checks that the name of a file tells a format that can be written.
+    pub fn parse(text: &str) -> Result<Target, String> {
+        if text == "-" {
+            return Ok(Target::Stdout);
+        }
+        match Format::of(Path::new(text)) {
+            Ok(_) if !text.to_lowercase().ends_with(".gz") => Ok(Target::File(PathBuf::from(text))),
+            _ => {
+                Err("the name must end in .csv, .parquet or .ndjson, or be - for standard output".to_owned())
+            }
+        }
+    }
+
+    /// The path, if it is a file.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Target::Stdout => None,
+            Target::File(path) => Some(path),
+        }
+    }
+}
+
+/// Prints text.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| Failure::stdout(&error))
+}
+
+/// Prints one JSON object on a line of its own.
+pub fn print_json(value: &serde_json::Value) -> Result<(), Failure> {
+    print(&format!("{value}\n"))
+}
+
+/// Writes text to a file, whole or not at all, or prints it.
+pub fn write_text(target: Option<&Path>, text: &str) -> Result<(), Failure> {
+    let Some(path) = target.filter(|path| *path != Path::new("-")) else { return print(text) };
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(text.as_bytes())
+        .map_err(|error| Failure::failed(format!("{}: cannot write: {error}", path.display())))?;
+    Ok(file.finish()?)
+}
