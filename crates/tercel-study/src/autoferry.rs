@@ -1,17 +1,19 @@
 //! The study `autoferry`: real radar and lidar in a harbour against boats with satellite navigation.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
 use tercel_data::table::{Detections, Metric, Metrics, Tracks, Truths};
-use tercel_data::{ImportOptions, Source, import};
+use tercel_data::{AtomicFile, ImportOptions, Source, import};
 use tercel_pipeline::config::presets;
 use tercel_pipeline::{Config, Pipeline};
 use toml::Table;
 
 use crate::error::StudyError;
 use crate::evaluate::{EvaluateOptions, Evaluation, evaluate};
+use crate::report::{Picture, Report, Summary};
 use crate::table::{Figure, Row, StudyTable};
 use crate::tune::{Knob, descend};
 
@@ -70,7 +72,9 @@ pub struct AutoferryResult {
     pub table: StudyTable,
     /// Scores of each recording.
     pub metrics: Metrics,
-    /// The recordings with what each method made of them.
+    /// The recordings.
+    pub recordings: Vec<Recording>,
+    /// What each method made of each of them.
     pub scored: Vec<(String, Vec<Scored>)>,
 }
 
@@ -142,6 +146,67 @@ impl Recording {
     }
 }
 
+impl AutoferryResult {
+    /// The means over the recordings, and the figures of each recording, as text.
+    pub fn text(&self) -> String {
+        let mut text = self.table.text(&COLUMNS);
+        for (method, results) in &self.scored {
+            let rows = self.recordings.iter().zip(results).map(|(recording, result)| {
+                let mut row = row(method, std::slice::from_ref(result), self.table.seed);
+                row.method.clone_from(&recording.name);
+                row
+            });
+            let table = StudyTable { rows: rows.collect(), ..self.table.clone() };
+            text.push_str(&format!("\n{method}\n{}", table.text(&COLUMNS)));
+        }
+        text
+    }
+
+    /// Writes to `folder` the tracks of each method and recording (`METHOD_RECORDING.parquet`), the scores (`metrics.csv`), the
+    /// table (`study.json`) and a report with a picture of each recording under the first method (`report.html`).
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), StudyError> {
+        let failed = |source| StudyError::Folder { path: folder.to_path_buf(), source };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        for (method, results) in &self.scored {
+            for (recording, result) in self.recordings.iter().zip(results) {
+                let name = format!("{method}_{}.parquet", recording.name);
+                tercel_data::write_tracks(folder.join(name), &result.tracks)?;
+            }
+        }
+        tercel_data::write_metrics(folder.join("metrics.csv"), &self.metrics)?;
+        let json = serde_json::to_vec_pretty(&self.table).map_err(|error| failed(error.into()))?;
+        let mut file = AtomicFile::create(&folder.join("study.json"))?;
+        file.write_all(&json).map_err(failed)?;
+        file.finish()?;
+        Ok(self.report()?.write(folder.join("report.html"))?)
+    }
+
+    fn report(&self) -> Result<Report, StudyError> {
+        let mut summary = Summary::new();
+        for row in &self.table.rows {
+            for (name, figure) in &row.metrics {
+                summary =
+                    summary.with(format!("{}: {name}", row.method), format!("{:.3}", figure.mean), None);
+            }
+        }
+        let mut report = Report::new("Study autoferry")
+            .with_subtitle(format!("Means over {} recordings; pictures of the first method", self.table.runs))
+            .with(summary);
+        if let Some((method, results)) = self.scored.first() {
+            for (recording, result) in self.recordings.iter().zip(results) {
+                let picture =
+                    Picture::new(&recording.detections, &result.tracks, Some(&recording.truths), &[])?;
+                let title = Summary::new().with("recording", format!("{}, {method}", recording.name), None);
+                report = report.with(title).with(picture.with_chart(result.evaluation.chart()));
+            }
+        }
+        Ok(report)
+    }
+}
+
 /// The first number in a name, so that `scenario13` comes after `scenario2`.
 fn number_of(name: &str) -> u64 {
     let digits: String =
@@ -182,7 +247,8 @@ pub fn run(
     }
     let rows = scored.iter().map(|(method, results)| row(method, results, seed)).collect();
     let table = StudyTable { study: NAME.to_string(), seed, runs: recordings.len(), rows };
-    Ok(AutoferryResult { table, metrics: metrics(&recordings, &scored), scored })
+    let metrics = metrics(&recordings, &scored);
+    Ok(AutoferryResult { table, metrics, recordings, scored })
 }
 
 /// The shipped configuration of a method.
