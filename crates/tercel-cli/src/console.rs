@@ -98,11 +98,11 @@ impl Console {
     /// Prints why the program ends, and gives its exit code.
     pub fn fail(&self, failure: &Failure) -> ExitCode {
         if let Some(report) = failure.report() {
-            self.line("error", "31", report.message);
-            for cause in report.causes {
+            self.line("error", "31", &report.message);
+            for cause in &report.causes {
                 eprintln!("  caused by: {cause}");
             }
-            if let Some(help) = report.help {
+            if let Some(help) = &report.help {
                 eprintln!("  {}: {help}", self.painted("help", "32"));
             }
         }

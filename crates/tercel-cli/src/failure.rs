@@ -16,8 +16,8 @@ pub enum Failure {
     Input(Report),
     /// The system refused, or the program is at fault.
     Failed(Report),
-    /// The arguments do not fit each other; the message is that of the argument parser.
-    Usage(Box<clap::Error>),
+    /// The arguments do not fit each other.
+    Usage(Report),
     /// Nobody reads the output any more, which is no error.
     Unread,
 }
@@ -72,9 +72,8 @@ impl Failure {
     }
 
     /// Arguments that do not fit each other.
-    pub fn usage(kind: clap::error::ErrorKind, message: impl std::fmt::Display) -> Self {
-        let mut command = <crate::arguments::Cli as clap::CommandFactory>::command();
-        Failure::Usage(Box::new(command.error(kind, message)))
+    pub fn usage(message: impl Into<String>) -> Self {
+        Failure::Usage(Report::new(message)).with_help("--help says what fits")
     }
 
     /// Standard output could not be written.
@@ -105,28 +104,32 @@ impl Failure {
     }
 
     /// The same with what to do about it.
-    pub fn with_help(self, text: impl Into<String>) -> Self {
-        let help = Some(text.into());
-        match self {
-            Failure::Input(report) => Failure::Input(Report { help, ..report }),
-            Failure::Failed(report) => Failure::Failed(Report { help, ..report }),
-            other => other,
+    pub fn with_help(mut self, text: impl Into<String>) -> Self {
+        if let Some(report) = self.report_mut() {
+            report.help = Some(text.into());
         }
+        self
+    }
+
+    /// The same with the name of the file in which it was found.
+    pub fn found_in(mut self, file: &str) -> Self {
+        if let Some(report) = self.report_mut() {
+            report.message.insert_str(0, &format!("{file}: "));
+        }
+        self
     }
 
     /// What is printed, if anything is.
-    pub fn report(&self) -> Option<ReportView<'_>> {
+    pub fn report(&self) -> Option<&Report> {
         match self {
-            Failure::Input(report) | Failure::Failed(report) => Some(ReportView {
-                message: report.message.clone(),
-                causes: &report.causes,
-                help: report.help.as_deref(),
-            }),
-            Failure::Usage(error) => {
-                let text = error.to_string();
-                let message = text.strip_prefix("error: ").unwrap_or(&text).trim_end().to_owned();
-                Some(ReportView { message, causes: &[], help: None })
-            }
+            Failure::Input(report) | Failure::Failed(report) | Failure::Usage(report) => Some(report),
+            Failure::Unread => None,
+        }
+    }
+
+    fn report_mut(&mut self) -> Option<&mut Report> {
+        match self {
+            Failure::Input(report) | Failure::Failed(report) | Failure::Usage(report) => Some(report),
             Failure::Unread => None,
         }
     }
@@ -140,17 +143,6 @@ impl Failure {
             Failure::Input(_) => 3,
         })
     }
-}
-
-/// What is printed about a failure.
-#[derive(Debug)]
-pub struct ReportView<'a> {
-    /// What is wrong and where.
-    pub message: String,
-    /// What lies behind it.
-    pub causes: &'a [String],
-    /// What to do about it.
-    pub help: Option<&'a str>,
 }
 
 impl From<DataError> for Failure {

@@ -24,7 +24,7 @@ pub struct ReadArguments {
     #[arg(long, value_name = "FORMAT", value_parser = source_parser())]
     pub from: Option<Source>,
     /// Unit of bearings in a detection table.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, value_name = "UNIT")]
     pub angles: AngleUnit,
     /// Name of the sensor, for a detection table that does not name one.
     #[arg(long, value_name = "NAME")]
@@ -89,7 +89,7 @@ impl ReadArguments {
             other => {
                 let message =
                     format!("a recording of the kind `{}` cannot come from standard input", other.name());
-                return Err(Failure::usage(clap::error::ErrorKind::ArgumentConflict, message));
+                return Err(Failure::usage(message));
             }
         };
         let detections = read_detections_from(std::io::stdin(), format, STDIN, &self.options())?;

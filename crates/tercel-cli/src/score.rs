@@ -14,13 +14,13 @@ use crate::progress::Progress;
 #[command(next_help_heading = "Scoring")]
 pub struct ScoreArguments {
     /// Distance in m beyond which a track has nothing to do with an object.
-    #[arg(long, default_value_t = 20.0, value_name = "M", value_parser = positive)]
+    #[arg(long, default_value_t = 20.0, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     pub cutoff: f64,
     /// Order of GOSPA and OSPA, 1 or more.
-    #[arg(long, default_value_t = 1.0, value_name = "P", value_parser = order)]
+    #[arg(long, default_value_t = 1.0, value_name = "P", value_parser = order, allow_negative_numbers = true)]
     pub order: f64,
     /// The metrics named `near` count false tracks only within this distance in m of an object.
-    #[arg(long, default_value_t = 150.0, value_name = "M", value_parser = positive)]
+    #[arg(long, default_value_t = 150.0, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     pub near: f64,
 }
 

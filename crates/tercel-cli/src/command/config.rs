@@ -13,6 +13,7 @@ use crate::output::{print, write_text};
 
 /// Write, check and describe configurations.
 #[derive(Debug, Subcommand)]
+#[command(after_long_help = AFTER)]
 pub enum ConfigCommand {
     /// Write a configuration with comments, to start from.
     Init(InitArguments),
@@ -48,6 +49,11 @@ pub struct CheckArguments {
     /// The configuration, a TOML file; - is standard input.
     file: PathBuf,
 }
+
+const AFTER: &str = "\
+Examples:
+  tercel config init -o tracker.toml
+  tercel config check tracker.toml";
 
 const INIT_AFTER: &str = "\
 Examples:
@@ -100,21 +106,23 @@ impl InitArguments {
     }
 }
 
-/// Reads a configuration and builds its tracker once, which finds what no single key can say.
+/// Reads a configuration and builds its tracker, which finds what no single key can say.
 pub fn read(path: &Path) -> Result<(Config, Pipeline), Failure> {
-    let text = read_text(path)?;
-    let name = path.to_string_lossy();
-    let config = Config::parse(&text).map_err(|error| Failure::config(&name, &text, &error))?;
-    let pipeline = Pipeline::new(&config).map_err(|error| Failure::config(&name, &text, &error))?;
-    Ok((config, pipeline))
+    build(&path.to_string_lossy(), &read_text(path)?)
 }
 
 /// One of the configurations that come with the program.
 pub fn preset(name: &str) -> Result<(Config, Pipeline), Failure> {
-    let text = presets::get(name).unwrap_or_default();
-    let config = Config::parse(text).map_err(|error| Failure::config(name, text, &error))?;
-    let pipeline = Pipeline::new(&config).map_err(|error| Failure::config(name, text, &error))?;
-    Ok((config, pipeline))
+    build(name, presets::get(name).unwrap_or_default())
+}
+
+fn build(name: &str, text: &str) -> Result<(Config, Pipeline), Failure> {
+    let build = || {
+        let config = Config::parse(text)?;
+        let pipeline = Pipeline::new(&config)?;
+        Ok((config, pipeline))
+    };
+    build().map_err(|error| Failure::config(name, text, &error))
 }
 
 fn described(config: &Config) -> String {

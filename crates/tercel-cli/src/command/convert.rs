@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::error::ErrorKind;
 use tercel_data::table::{Origin, Truths};
 use tercel_data::{AtomicFile, Format, ImportOptions, Imported, write_detections_to, write_truths_to};
 
@@ -85,7 +84,7 @@ impl ConvertArguments {
     }
 
     fn check(&self) -> Result<(), Failure> {
-        let conflict = |message: &str| Err(Failure::usage(ErrorKind::ArgumentConflict, message));
+        let conflict = |message: &str| Err(Failure::usage(message));
         match &self.truth_out {
             Some(Target::Stdout) => return conflict("--truth-out needs a file"),
             Some(truth) if *truth == self.output => return conflict("-o and --truth-out name the same file"),

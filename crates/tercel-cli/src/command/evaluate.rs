@@ -51,7 +51,7 @@ impl EvaluateArguments {
     pub fn run(&self, console: &Console) -> Result<(), Failure> {
         if self.json && self.output == Some(Target::Stdout) {
             let message = "--json and -o - both write to standard output";
-            return Err(Failure::usage(clap::error::ErrorKind::ArgumentConflict, message));
+            return Err(Failure::usage(message));
         }
         let tracks = read_tracks(&self.tracks, &ReadOptions::default())?;
         let truths = input::truth(&self.truth)?;

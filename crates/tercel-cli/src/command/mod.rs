@@ -12,21 +12,15 @@ use clap::Subcommand;
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// What to do.
+/// What to do. The commands' own documentation is their help.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Turn detections into tracks.
     Track(track::TrackArguments),
-    /// Score tracks against the truth.
     Evaluate(evaluate::EvaluateArguments),
-    /// Bring recordings of other programs into the tables.
     Convert(convert::ConvertArguments),
-    /// Write, check and describe configurations.
     #[command(subcommand)]
     Config(config::ConfigCommand),
-    /// Run a study: a scenario, several trackers, their scores.
     Study(study::StudyArguments),
-    /// Print the completions of a shell.
     Completions(completions::CompletionsArguments),
 }
 

@@ -55,7 +55,7 @@ impl StudyArguments {
                 let known: Vec<&str> = STUDIES.iter().map(|study| study.name).collect();
                 let message =
                     format!("there is no study `{}`; known studies: {}", self.name, known.join(", "));
-                Err(Failure::usage(clap::error::ErrorKind::InvalidValue, message))
+                Err(Failure::usage(message))
             }
         }
     }

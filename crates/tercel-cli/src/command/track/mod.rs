@@ -6,7 +6,6 @@ mod run;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::error::ErrorKind;
 use tercel_data::ndjson::Scans;
 use tercel_data::table::{Scan, Truths};
 use tercel_data::{DataError, ImportOptions, Imported, Source};
@@ -59,7 +58,7 @@ pub struct TrackArguments {
     #[arg(long)]
     json: bool,
     /// With NDJSON on standard input: what becomes of a line or a scan that cannot be used.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, value_name = "WHAT")]
     on_error: OnError,
     #[command(flatten)]
     score: ScoreArguments,
@@ -89,7 +88,7 @@ impl TrackArguments {
         let stream = is_stdin(&self.input) && matches!(self.read.from, None | Some(Source::Ndjson));
         if self.on_error == OnError::Skip && !stream {
             let message = "--on-error skip is for NDJSON on standard input";
-            return Err(Failure::usage(ErrorKind::ArgumentConflict, message));
+            return Err(Failure::usage(message));
         }
         let outcome = if stream { self.run_stream(console)? } else { self.run_file(console)? };
         outcome.write(self, console)
@@ -102,7 +101,7 @@ impl TrackArguments {
     }
 
     fn check(&self) -> Result<(), Failure> {
-        let conflict = |message: &str| Err(Failure::usage(ErrorKind::ArgumentConflict, message));
+        let conflict = |message: &str| Err(Failure::usage(message));
         let target = self.target();
         let tracks = target.as_ref().and_then(Target::file);
         if self.json && target == Some(Target::Stdout) {
@@ -113,7 +112,7 @@ impl TrackArguments {
         if tracks.is_some() && tracks == self.report.as_deref() {
             return conflict("-o and --report name the same file");
         }
-        if [tracks, self.report.as_deref()].into_iter().flatten().any(|path| path == self.input) {
+        if [tracks, self.report.as_deref()].into_iter().flatten().any(|path| is_same(path, &self.input)) {
             return conflict("an output names the same file as the input");
         }
         // Found now rather than after hours of tracking.
@@ -142,12 +141,13 @@ impl TrackArguments {
         run.begin(detections.origin)?;
         let progress = Progress::bar(console, "tracking", detections.scans.len());
         for scan in detections.scans {
-            let rows = run.track(scan)?;
+            let rows = run.track(scan).map_err(|error| self.refused(error))?;
             run.hand_on(rows)?;
             progress.step();
         }
         drop(progress);
-        run.end()?;
+        let rows = run.end().map_err(|error| self.refused(error))?;
+        run.hand_on(rows)?;
         Ok(Outcome { run, truths, config, configuration: name, bad: 0 })
     }
 
@@ -159,21 +159,20 @@ impl TrackArguments {
         let mut bad = 0;
         while let Some(scan) = scans.next() {
             run.begin(scans.origin())?;
-            match track_one(&mut run, scan)? {
+            match self.track_one(&mut run, scan)? {
                 Ok(()) => {}
                 Err(failure) if self.on_error == OnError::Skip => {
                     bad += 1;
-                    let report = failure.report();
-                    console.warn(format_args!(
-                        "left out: {}",
-                        report.map(|report| report.message).unwrap_or_default()
-                    ));
+                    if let Some(report) = failure.report() {
+                        console.warn(format_args!("left out: {}", report.message));
+                    }
                 }
                 Err(failure) => return Err(failure),
             }
         }
         run.begin(scans.origin())?;
-        run.end()?;
+        let rows = run.end().map_err(|error| self.refused(error))?;
+        run.hand_on(rows)?;
         Ok(Outcome { run, truths, config, configuration: name, bad })
     }
 
@@ -206,20 +205,35 @@ impl TrackArguments {
             None => Ok(found),
         }
     }
+
+    /// Tracks a scan of a stream. The inner error is one of that scan alone, after which the stream can go on.
+    fn track_one(
+        &self,
+        run: &mut Run,
+        scan: Result<Scan, DataError>,
+    ) -> Result<Result<(), Failure>, Failure> {
+        let scan = match scan {
+            Ok(scan) => scan,
+            Err(error) if error.is_io() => return Err(error.into()),
+            Err(error) => return Ok(Err(error.into())),
+        };
+        match run.track(scan) {
+            Ok(rows) => run.hand_on(rows).map(Ok),
+            Err(error @ (PipelineError::UnknownSensor { .. } | PipelineError::Observation { .. })) => {
+                Ok(Err(self.refused(error)))
+            }
+            Err(error) => Err(self.refused(error)),
+        }
+    }
+
+    /// A scan that the tracker refuses, with the name of the input.
+    fn refused(&self, error: PipelineError) -> Failure {
+        let file = if is_stdin(&self.input) { STDIN.into() } else { self.input.to_string_lossy() };
+        Failure::from(error).found_in(&file)
+    }
 }
 
-/// Tracks a scan of a stream. The inner error is one of that scan alone, after which the stream can go on.
-fn track_one(run: &mut Run, scan: Result<Scan, DataError>) -> Result<Result<(), Failure>, Failure> {
-    let scan = match scan {
-        Ok(scan) => scan,
-        Err(error) if error.is_io() => return Err(error.into()),
-        Err(error) => return Ok(Err(error.into())),
-    };
-    match run.track(scan) {
-        Ok(rows) => run.hand_on(rows).map(Ok),
-        Err(error @ (PipelineError::UnknownSensor { .. } | PipelineError::Observation { .. })) => {
-            Ok(Err(error.into()))
-        }
-        Err(error) => Err(error.into()),
-    }
+/// True when two paths lead to one file that is there.
+fn is_same(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }

@@ -103,12 +103,12 @@ impl Run {
         Ok(())
     }
 
-    /// Tracks what is still held back, and writes it.
-    pub fn end(&mut self) -> Result<(), Failure> {
+    /// Tracks what is still held back, and returns its rows.
+    pub fn end(&mut self) -> Result<Vec<Track>, PipelineError> {
         let started = Instant::now();
-        let rows = self.pipeline.finish()?;
+        let rows = self.pipeline.finish();
         self.busy += started.elapsed();
-        self.hand_on(rows)
+        rows
     }
 
     /// Puts the file of tracks in its place.
