@@ -60,8 +60,8 @@ impl<S: Sensor<4, 2>> Sensor<4, 2> for Interleaved<S> {
     fn place(&self, seen: &Measurement<2>) -> Option<Vector2<f64>> {
         self.0.place(seen)
     }
-    fn spread(&self, state: &Vector4<f64>) -> Option<SMatrix<f64, 2, 2>> {
-        self.0.spread(&ours(state))
+    fn footprint(&self, state: &Vector4<f64>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+        self.0.footprint(&ours(state))
     }
 }
 

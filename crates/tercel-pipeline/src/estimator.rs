@@ -194,8 +194,8 @@ impl<const K: usize, const N: usize, const M: usize> Sensor<K, M> for Shortened<
         self.sensor.place(measurement)
     }
 
-    fn spread(&self, state: &SVector<f64, K>) -> Option<SMatrix<f64, 2, 2>> {
-        self.sensor.spread(&lengthened(state))
+    fn footprint(&self, state: &SVector<f64, K>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+        self.sensor.footprint(&lengthened(state))
     }
 
     fn area(&self, measurement: &Measurement<M>) -> f64 {

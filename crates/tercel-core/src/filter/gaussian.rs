@@ -52,10 +52,9 @@ pub(super) fn reach<const N: usize, const M: usize>(
     if N < 2 {
         return None;
     }
-    let spread = sensor.spread(&belief.mean)?;
-    let place = sensor.place(&sensor.expected(&belief.mean).into())?;
-    let position = SMatrix::from_fn(|i, j| belief.covariance[(i, j)]);
-    Some((place, position + spread))
+    let (place, noise) = sensor.footprint(&belief.mean)?;
+    let position: SMatrix<f64, 2, 2> = SMatrix::from_fn(|i, j| belief.covariance[(i, j)]);
+    Some((place, position + noise))
 }
 
 /// The Gaussian with the moments of a mixture, relative to the sum of its weights. An empty one has no moments: zeros.

@@ -203,7 +203,7 @@ mod tests {
         fn place(&self, _: &Measurement<1>) -> Option<nalgebra::Vector2<f64>> {
             None
         }
-        fn spread(&self, _: &SVector<f64, 1>) -> Option<SMatrix<f64, 2, 2>> {
+        fn footprint(&self, _: &SVector<f64, 1>) -> Option<(nalgebra::Vector2<f64>, SMatrix<f64, 2, 2>)> {
             None
         }
     }

@@ -98,7 +98,7 @@ impl<const N: usize> Sensor<N, 1> for BearingOnly {
         None
     }
 
-    fn spread(&self, _: &SVector<f64, N>) -> Option<Matrix2<f64>> {
+    fn footprint(&self, _: &SVector<f64, N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         None
     }
 }

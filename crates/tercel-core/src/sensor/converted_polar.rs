@@ -156,7 +156,8 @@ impl<const N: usize> Sensor<N, 2> for ConvertedPolar {
         Some(Sensor::<2, 2>::read(self, measurement).value)
     }
 
-    fn spread(&self, state: &SVector<f64, N>) -> Option<Matrix2<f64>> {
-        Some(Sensor::<N, 2>::noise(self, &Sensor::<N, 2>::expected(self, state)))
+    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        let expected = Sensor::<N, 2>::expected(self, state);
+        Some((expected, Sensor::<N, 2>::noise(self, &expected)))
     }
 }

@@ -132,11 +132,11 @@ pub trait Sensor<const N: usize, const M: usize> {
     /// Where in the plane (`x, y`) the measurement was taken to be, if it says so.
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>>;
 
-    /// Covariance in the plane of the error of [`place`](Sensor::place), for an object in this state. Gates are
-    /// searched in the plane with it before readings are compared.
+    /// Where in the plane a measurement of an object in this state is expected, and the covariance of the error of its
+    /// [`place`](Sensor::place). Gates are searched in the plane with it before readings are compared.
     ///
     /// `None` for sensors that do not say where an object is.
-    fn spread(&self, state: &SVector<f64, N>) -> Option<SMatrix<f64, 2, 2>>;
+    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)>;
 
     /// Area of the plane (m²) that one unit of volume of the reading's space covers near a measurement, so that a
     /// clutter intensity given per m² becomes one per unit of the reading.
@@ -178,8 +178,8 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {
         (**self).place(measurement)
     }
-    fn spread(&self, state: &SVector<f64, N>) -> Option<SMatrix<f64, 2, 2>> {
-        (**self).spread(state)
+    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+        (**self).footprint(state)
     }
     fn area(&self, measurement: &Measurement<M>) -> f64 {
         (**self).area(measurement)

@@ -122,7 +122,9 @@ impl<const N: usize, const M: usize> Sensor<N, M> for Position<M> {
         (M >= 2).then(|| Vector2::new(measurement.value[0], measurement.value[1]))
     }
 
-    fn spread(&self, _: &SVector<f64, N>) -> Option<SMatrix<f64, 2, 2>> {
-        (M >= 2).then(|| SMatrix::from_fn(|i, j| self.noise[(i, j)]))
+    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+        let expected: SVector<f64, M> = self.expected(state);
+        (M >= 2)
+            .then(|| (Vector2::new(expected[0], expected[1]), SMatrix::from_fn(|i, j| self.noise[(i, j)])))
     }
 }

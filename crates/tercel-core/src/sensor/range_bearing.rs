@@ -99,9 +99,10 @@ impl<const N: usize> Sensor<N, 2> for RangeBearing {
         Some(self.position + cartesian(measurement.value[0], measurement.value[1]))
     }
 
-    fn spread(&self, state: &SVector<f64, N>) -> Option<Matrix2<f64>> {
+    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         let expected: Vector2<f64> = Sensor::<N, 2>::expected(self, state);
-        Some(rotated(expected[0], expected[1], &Sensor::<N, 2>::noise(self, &expected)))
+        let noise = Sensor::<N, 2>::noise(self, &expected);
+        Some((vector![state[0], state[1]], rotated(expected[0], expected[1], &noise)))
     }
 
     fn area(&self, measurement: &Measurement<2>) -> f64 {

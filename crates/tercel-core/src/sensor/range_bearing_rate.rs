@@ -133,8 +133,8 @@ impl<const N: usize> Sensor<N, 3> for RangeBearingRate {
         Sensor::<2, 2>::place(&self.polar, &Self::polar_part(measurement))
     }
 
-    fn spread(&self, state: &SVector<f64, N>) -> Option<Matrix2<f64>> {
-        Sensor::<N, 2>::spread(&self.polar, state)
+    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        Sensor::<N, 2>::footprint(&self.polar, state)
     }
 
     fn area(&self, measurement: &Measurement<3>) -> f64 {

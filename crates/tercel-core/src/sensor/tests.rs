@@ -74,6 +74,24 @@ fn a_lag_couples_the_born_position_to_its_velocity() {
     assert!((explained - Matrix2x2::identity() * 4.0).amax() < 1e-9);
 }
 
+#[test]
+fn an_object_is_expected_where_its_measurement_is_placed() {
+    let (here, state) = (vector![100.0, -50.0], vector![400.0, 350.0, 3.0, 4.0]);
+    fn agrees<const M: usize>(sensor: &impl Sensor<4, M>, seen: SVector<f64, M>, state: &SVector<f64, 4>) {
+        let (expected, covariance) = sensor.footprint(state).unwrap();
+        assert!((expected - sensor.place(&seen.into()).unwrap()).norm() < 0.1);
+        assert!(covariance.determinant() > 0.0);
+    }
+    let position = Position::<2>::new(5.0).unwrap().with_lag(2.0);
+    agrees(&position, position.expected(&state), &state);
+    let polar = RangeBearing::new(2.0, 0.01).unwrap().at(here);
+    let seen = polar.expected(&state);
+    agrees(&polar, seen, &state);
+    agrees(&ConvertedPolar::new(2.0, 0.01).unwrap().at(here), seen, &state);
+    let doppler = RangeBearingRate::new(2.0, 0.01, 1.0).unwrap().at(here, vector![1.0, 1.0]);
+    agrees(&doppler, doppler.expected(&state), &state);
+}
+
 type Matrix2x2 = SMatrix<f64, 2, 2>;
 
 #[test]
