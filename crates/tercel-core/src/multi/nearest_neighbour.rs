@@ -142,7 +142,9 @@ impl<B: Clone> NearestNeighbour<B> {
         F: Filter<N, Belief = B> + ?Sized,
     {
         let Scratch { index, near, solver, pairs, misses, detection, columns } = &mut self.scratch;
-        (pairs.clear(), misses.clear(), detection.clear());
+        pairs.clear();
+        misses.clear();
+        detection.clear();
         for (row, track) in self.tracks.iter().enumerate() {
             let reach = filter.reach(&track.belief);
             let seen = scan.detection.probability(reach.as_ref().map(|(centre, _)| centre));
@@ -217,8 +219,8 @@ impl<B: Clone> NearestNeighbour<B> {
         let Scratch { index, near, .. } = &mut self.scratch;
         let states: Vec<_> = self.tracks.iter().map(|track| plane(&filter.state(&track.belief))).collect();
         index.build(&states.iter().map(|state| state.map(|state| state.0)).collect::<Vec<_>>());
-        for row in 0..self.tracks.len() {
-            let Some((centre, spread)) = &states[row] else { continue };
+        for (row, state) in states.iter().enumerate() {
+            let Some((centre, spread)) = state else { continue };
             index.near(centre, spread, self.config.merge, near);
             for &other in near.iter().filter(|&&other| other != row) {
                 let (track, rival) = (&self.tracks[row], &self.tracks[other]);

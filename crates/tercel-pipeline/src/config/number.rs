@@ -71,7 +71,7 @@ ranged!(
 );
 ranged!(
     /// A whole number from 1 to a million.
-    Count, u32, |x| x >= 1.0 && x <= 1e6 && x.fract() == 0.0, "a whole number, 1 to 1,000,000",
+    Count, u32, |x| (1.0..=1e6).contains(&x) && x.fract() == 0.0, "a whole number, 1 to 1,000,000",
     { "type": "integer", "minimum": 1, "maximum": 1_000_000 }
 );
 
