@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use tercel_data::DataError;
 use tercel_pipeline::PipelineError;
+use tercel_study::StudyError;
 use tercel_study::report::ReportError;
 
 /// Why the program ends without success.
@@ -163,6 +164,17 @@ impl From<DataError> for Failure {
 impl From<PipelineError> for Failure {
     fn from(error: PipelineError) -> Self {
         Failure::Input(Report::of(&error))
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Data(error) => error.into(),
+            StudyError::Report(error) => error.into(),
+            StudyError::Score(_) => Failure::Failed(Report::of(&error)),
+            _ => Failure::Input(Report::of(&error)),
+        }
     }
 }
 

@@ -7,7 +7,8 @@
 //! cargo bench -p tercel-core --features instructions --bench instructions
 //! ```
 
-#![allow(clippy::unwrap_used)]
+// The macros of the harness make modules without documentation.
+#![allow(clippy::unwrap_used, missing_docs)]
 
 use std::hint::black_box;
 

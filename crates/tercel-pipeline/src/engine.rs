@@ -12,7 +12,7 @@ use tercel_data::table::{self, Scan};
 
 use crate::PipelineError;
 use crate::config::{self, Config, Estimator, MotionConfig, TrackerConfig};
-use crate::estimator::{Mode, Recursion, Rule, Single, Switching};
+use crate::estimator::{Cloud, Mode, Recursion, Rule, Single, Switching};
 use crate::sensors::{self, Kind, Station};
 
 /// What a scan led to.
@@ -55,12 +55,24 @@ pub(crate) fn engine(config: &Config) -> Result<Box<dyn Engine>, PipelineError> 
     }
 }
 
+/// Particles of an object when the configuration does not say.
+const DEFAULT_PARTICLES: usize = 1_000;
+
 fn with_single<const N: usize>(
     motion: Box<dyn Motion<N>>,
     rule: Rule,
     config: &Config,
 ) -> Result<Box<dyn Engine>, PipelineError> {
-    with_tracker::<N, _>(Single { motion, rule }, config)
+    match config.filter.estimator {
+        Estimator::Particle => {
+            let count = config.filter.particles.map_or(DEFAULT_PARTICLES, |count| count.get() as usize);
+            if count < 10 {
+                return Err(PipelineError::config("filter.particles", "must be at least 10"));
+            }
+            with_tracker::<N, _>(Cloud { motion, count, seed: config.filter.seed }, config)
+        }
+        _ => with_tracker::<N, _>(Single { motion, rule }, config),
+    }
 }
 
 fn with_tracker<const N: usize, R>(recursion: R, config: &Config) -> Result<Box<dyn Engine>, PipelineError>

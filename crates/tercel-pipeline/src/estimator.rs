@@ -3,7 +3,9 @@
 use nalgebra::{SMatrix, SVector, Vector2};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Extended, Filter, Imm, ImmBelief, Padded, Transition, Unscented};
+use tercel_core::filter::{
+    Extended, Filter, Imm, ImmBelief, Padded, Particle, Particles, Transition, Unscented,
+};
 use tercel_core::motion::Motion;
 use tercel_core::sensor::{Measurement, Reading, Sensor};
 
@@ -49,6 +51,29 @@ impl<const N: usize> Recursion<N> for Single<N> {
             Rule::Extended => work(&Extended::<_, _, M>::new(&*self.motion, sensor)),
             Rule::Unscented => work(&Unscented::<_, _, M>::new(&*self.motion, sensor)),
         })
+    }
+}
+
+/// One model of motion, estimated by particles.
+pub(crate) struct Cloud<const N: usize> {
+    pub motion: Box<dyn Motion<N>>,
+    pub count: usize,
+    pub seed: u64,
+}
+
+/// Share by which resampled particles are spread, so that a vague birth does not end in a handful of copies.
+const SMOOTHING: f64 = 0.35;
+
+impl<const N: usize> Recursion<N> for Cloud<N> {
+    type Belief = Particles<N>;
+
+    fn with<const M: usize, R>(
+        &self,
+        sensor: &dyn Sensor<N, M>,
+        work: impl FnOnce(&dyn Filter<N, Belief = Particles<N>, Measurement = Measurement<M>>) -> R,
+    ) -> Result<R, FilterError> {
+        let filter = Particle::<_, _, M>::new(&*self.motion, sensor, self.count, self.seed)?;
+        Ok(work(&filter.with_smoothing(SMOOTHING)?))
     }
 }
 

@@ -7,6 +7,7 @@ use tercel_core::error::FilterError;
 use tercel_core::metric::{Gospa, Ospa, Trajectory, TrajectoryGospa};
 use tercel_data::table::{Tracks, Truths};
 
+use crate::report::{Chart, Form};
 use crate::timeline::{self, Timeline};
 
 /// What counts as found, and when it is looked at.
@@ -91,6 +92,18 @@ impl Evaluation {
     /// A mean by its name.
     pub fn mean(&self, name: &str) -> Option<f64> {
         self.means.iter().find(|mean| mean.0 == name).map(|mean| mean.1)
+    }
+}
+
+impl Evaluation {
+    /// The parts of GOSPA over time, stacked.
+    pub fn chart(&self) -> Chart {
+        let column = |value: fn(&Instant) -> f64| -> Vec<f64> { self.instants.iter().map(value).collect() };
+        Chart::over_time("GOSPA", "m", column(|instant| instant.time))
+            .with_form(Form::Stacked)
+            .with_part("localisation", column(|instant| instant.localisation))
+            .with_part("missed", column(|instant| instant.missed))
+            .with_part("false", column(|instant| instant.false_alarm))
     }
 }
 

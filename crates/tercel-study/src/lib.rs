@@ -1,5 +1,19 @@
 //! Studies and reports: run trackers over scenarios, score them, draw the result.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | [`evaluate`] | scores tracks against the truth |
+//! | [`report`] | draws a recording, its tracks and scores as one HTML file |
+//! | [`autoferry`] | the study on real radar and lidar |
+//! | [`tune`] | fits the numbers of a configuration to recordings |
 
+pub mod autoferry;
+mod error;
 pub mod evaluate;
 pub mod report;
+mod table;
 mod timeline;
+pub mod tune;
+
+pub use error::StudyError;
+pub use table::{Figure, Row, StudyTable};

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use tercel_study::autoferry;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::output;
 
 /// Run a study: a scenario, several trackers, their scores.
 #[derive(Debug, Args)]
@@ -20,7 +22,7 @@ pub struct StudyArguments {
     /// Methods to run, with commas between them; without it, all of the study.
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
     pub methods: Option<Vec<String>>,
-    /// Folder for the table of metrics and the report.
+    /// Folder for the tracks, the table of metrics and the report.
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -33,7 +35,7 @@ Studies:
   autoferry  radar and lidar of a small ferry against the GNSS truth of two boats
 
 Examples:
-  tercel study autoferry --data data/autoferry
+  tercel study autoferry --methods nearest-neighbour,phd
   tercel study autoferry --data data/autoferry --json -o results";
 
 /// A study that the program knows.
@@ -59,6 +61,21 @@ impl StudyArguments {
     }
 }
 
-fn autoferry(_: &StudyArguments, _: &Console) -> Result<(), Failure> {
-    Err(Failure::failed("the study `autoferry` is not part of this version"))
+/// The recordings that come with the source code.
+const RECORDINGS: &str = "data/autoferry";
+
+fn autoferry(arguments: &StudyArguments, console: &Console) -> Result<(), Failure> {
+    let folder = arguments.data.clone().unwrap_or_else(|| RECORDINGS.into());
+    let methods = arguments.methods.clone().unwrap_or_else(|| autoferry::METHODS.map(str::to_owned).to_vec());
+    let result = autoferry::run(&folder, &methods, 0, &|what| console.note(what))?;
+    if let Some(folder) = &arguments.output {
+        result.write(folder)?;
+        console.note(format!("tracks, metrics.csv, study.json and report.html are in {}", folder.display()));
+    }
+    if arguments.json {
+        let table = serde_json::to_value(&result.table)
+            .map_err(|error| Failure::failed(format!("cannot encode the table: {error}")))?;
+        return output::print_json(&table);
+    }
+    output::print(&result.text())
 }

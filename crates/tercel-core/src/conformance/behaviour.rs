@@ -157,8 +157,8 @@ pub fn a_boxed_filter_is_the_filter<const N: usize, S: Subject<N>>(subject: &S) 
     for _ in 0..5 {
         world.step(1.0);
         let seen = look(subject, &mut world);
-        filter.predict_all(std::slice::from_mut(&mut plain), 1.0);
-        boxed.predict_all(std::slice::from_mut(&mut behind), 1.0);
+        filter.predict_all(&mut [&mut plain], 1.0);
+        boxed.predict_all(&mut [&mut behind], 1.0);
         filter.update(&mut plain, &seen).unwrap();
         boxed.update(&mut behind, &seen).unwrap();
         assert!(bits(&filter, &plain) == bits(&*boxed, &behind), "a boxed filter differs");

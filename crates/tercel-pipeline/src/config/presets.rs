@@ -1,9 +1,10 @@
 //! Configurations to start from.
 
 /// Name and text of each preset.
-const PRESETS: [(&str, &str); 5] = [
+const PRESETS: [(&str, &str); 6] = [
     ("default", include_str!("../../presets/default.toml")),
     ("harbour", include_str!("../../presets/harbour.toml")),
+    ("harbour-phd", include_str!("../../presets/harbour_phd.toml")),
     ("air-surveillance", include_str!("../../presets/air_surveillance.toml")),
     ("adsb", include_str!("../../presets/adsb.toml")),
     ("ais", include_str!("../../presets/ais.toml")),

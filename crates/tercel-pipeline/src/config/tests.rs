@@ -82,7 +82,12 @@ fn numbers(schema: &Value, root: &Value, path: &str, found: &mut Vec<(String, Va
         let path = format!("{path}.{name}");
         let kinds = property.get("type").map(ToString::to_string).unwrap_or_default();
         if kinds.contains("number") || kinds.contains("integer") {
-            found.push((path.clone(), property.clone()));
+            let mut property = property.clone();
+            // The sentence of a variant that is a single number stands at the variant.
+            if let (None, Some(sentence)) = (property.get("description"), target.get("description")) {
+                property["description"] = sentence.clone();
+            }
+            found.push((path.clone(), property));
         }
         // Modes hold motions, which hold modes: once is enough.
         if !path.ends_with(".modes") {

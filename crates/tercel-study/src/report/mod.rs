@@ -28,6 +28,8 @@ mod picture;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use tercel_data::AtomicFile;
+
 pub use chart::{Chart, Form};
 pub use picture::{Picture, SensorNote};
 
@@ -101,6 +103,9 @@ pub enum ReportError {
     /// The data could not be written as JSON.
     #[error("the data of the report could not be encoded")]
     Encode(#[from] serde_json::Error),
+    /// The file could not be created or put in its place.
+    #[error(transparent)]
+    File(#[from] tercel_data::DataError),
     /// The file could not be written.
     #[error("cannot write the report to {path}", path = .path.display())]
     Write {
@@ -141,25 +146,13 @@ impl Report {
     /// # Errors
     /// Those of [`Report::render`], and when the file cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), ReportError> {
-        let path = path.as_ref();
         let page = self.render()?;
-        write_whole(path, page.as_bytes())
-            .map_err(|source| ReportError::Write { path: path.to_path_buf(), source })
+        let path = path.as_ref();
+        let mut file = AtomicFile::create(path)?;
+        let failed = |source| ReportError::Write { path: path.to_path_buf(), source };
+        file.write_all(page.as_bytes()).map_err(failed)?;
+        Ok(file.finish()?)
     }
-}
-
-fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".report").suffix(".tmp");
-    // Temporary files are private by default; a report is as public as any other file of its writer.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut beside = builder.tempfile_in(folder)?;
-    beside.write_all(bytes)?;
-    beside.as_file().sync_all()?;
-    beside.persist(path)?;
-    Ok(())
 }
 
 impl Summary {
