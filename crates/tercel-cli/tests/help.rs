@@ -1,5 +1,7 @@
 //! What the program says about itself. `INSTA_UPDATE=always` accepts a change.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
 mod support;
 
 use support::{files, fixtures, run};

@@ -1,5 +1,7 @@
 //! What the program says about bad input, and how it ends. `INSTA_UPDATE=always` accepts a change.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
 mod support;
 
 use support::{command, finish, run};

@@ -1,5 +1,7 @@
 //! `tercel track`, `evaluate`, `convert` and `config` on files.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
 mod support;
 
 use std::path::Path;
