@@ -1,5 +1,7 @@
 //! Any filter inside any tracker.
 
+#![allow(clippy::unwrap_used)] // in the functions that the tests share
+
 use nalgebra::vector;
 use tercel_core::belief::Gaussian;
 use tercel_core::filter::{
