@@ -37,3 +37,6 @@ mod sensors;
 pub use config::Config;
 pub use error::PipelineError;
 pub use pipeline::{Pipeline, Summary};
+
+#[cfg(test)]
+mod tests;

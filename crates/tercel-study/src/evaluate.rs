@@ -18,7 +18,8 @@ pub struct EvaluateOptions {
     pub cutoff: f64,
     /// Order of the set metrics.
     pub order: f64,
-    /// Times to look at, s; without them every time at which a track was reported or a scan was made.
+    /// Times to look at, s; without them every time at which a track was reported while the truth is known. Give the times
+    /// of all scans where scans without any track should count as missed.
     pub times: Option<Vec<f64>>,
     /// Only false tracks within this distance of an object count in the metrics named `near`, m.
     pub near: f64,
