@@ -21,6 +21,8 @@ pub struct Pipeline {
     modes: Vec<String>,
     summary: Summary,
     confirmed: BTreeSet<u64>,
+    /// Tracks of scans that were released before one that was refused; they come with the next call.
+    held: Vec<Track>,
     config: Config,
 }
 
@@ -66,6 +68,7 @@ impl Pipeline {
             modes: config.motion.mode_names(),
             summary: Summary::default(),
             confirmed: BTreeSet::new(),
+            held: Vec::new(),
             config: config.clone(),
         })
     }
@@ -90,7 +93,8 @@ impl Pipeline {
     /// With `out_of_order = "buffer"` a scan is held back and its tracks come with a later one.
     ///
     /// # Errors
-    /// When the sensor is not described, a detection does not hold what the sensor measures, or a number is not finite.
+    /// When the sensor is not described, a detection does not hold what the sensor measures, or a number is not finite. That
+    /// scan is left out; the tracks of scans released before it come with the next call.
     pub fn push(&mut self, scan: Scan) -> Result<Vec<Track>, PipelineError> {
         if self.ignore.iter().any(|name| **name == *scan.sensor) {
             self.summary.ignored += 1;
@@ -116,17 +120,21 @@ impl Pipeline {
     }
 
     fn release(&mut self, all: bool) -> Result<Vec<Track>, PipelineError> {
-        let mut rows = Vec::new();
         while let Some(scan) = self.reorder.pop(all) {
-            let name = self.station(&scan)?;
-            let Some(station) = self.stations.get_mut(&name) else { continue };
-            station.move_to(&scan);
-            let outcome = self.engine.step(station, &scan)?;
-            learn(station, &outcome);
-            self.count(&outcome);
-            rows.extend(outcome.rows);
+            let rows = self.track(&scan)?;
+            self.held.extend(rows);
         }
-        Ok(rows)
+        Ok(std::mem::take(&mut self.held))
+    }
+
+    fn track(&mut self, scan: &Scan) -> Result<Vec<Track>, PipelineError> {
+        let name = self.station(scan)?;
+        let Some(station) = self.stations.get_mut(&name) else { return Ok(Vec::new()) };
+        station.move_to(scan);
+        let outcome = self.engine.step(station, scan)?;
+        learn(station, &outcome);
+        self.count(&outcome);
+        Ok(outcome.rows)
     }
 
     /// Name of the section that describes the sensor of a scan; one made from the default section if it has none.

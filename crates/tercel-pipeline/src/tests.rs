@@ -120,6 +120,20 @@ fn late_scans_are_counted_or_sorted_in() {
 }
 
 #[test]
+fn a_refused_scan_costs_no_tracks_of_others() {
+    let buffer = "[input]\nout_of_order = \"buffer\"\ndelay = 1.5";
+    let mut pipeline = Pipeline::new(&config(STRAIGHT, buffer, POSITION)).unwrap();
+    let mut rows = Vec::new();
+    for (time, kind) in [(0.0, "position"), (1.0, "polar"), (5.0, "position"), (6.0, "position")] {
+        rows.extend(pipeline.push(scan(time, &[observed(kind, time)])).unwrap_or_default());
+    }
+    rows.extend(pipeline.finish().unwrap());
+    let mut times: Vec<f64> = rows.iter().map(|row| row.time).collect();
+    times.dedup();
+    assert_eq!(times, [0.0, 5.0, 6.0]);
+}
+
+#[test]
 fn every_detection_is_counted_once() {
     let mut pipeline = Pipeline::new(&config(STRAIGHT, "", POSITION)).unwrap();
     for second in 0..10 {

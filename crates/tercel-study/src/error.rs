@@ -29,8 +29,8 @@ pub enum StudyError {
         /// The names that exist.
         known: String,
     },
-    /// A folder of recordings could not be listed.
-    #[error("cannot list {}: {source}", path.display())]
+    /// A folder could not be listed or written to.
+    #[error("cannot use the folder {}: {source}\n  help: say where the recordings are with --data DIR", path.display())]
     Folder {
         /// The folder.
         path: PathBuf,

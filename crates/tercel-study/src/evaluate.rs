@@ -83,7 +83,7 @@ pub struct Instant {
 pub struct Evaluation {
     /// Scores over time.
     pub instants: Vec<Instant>,
-    /// Means by name, in the order in which they are best read. Names: `covered`, `switches`, `false_tracks`,
+    /// Means by name, in the order in which they are best read; NaN where there was nothing to score. Names: `covered`, `switches`, `false_tracks`,
     /// `false_tracks_near`, `gospa`, `gospa_localisation`, `gospa_missed`, `gospa_false`, `gospa_near`, `ospa`,
     /// `rmse_pos_norm`, `rmse_pos`, `cardinality_error`, `tgospa`, `tgospa_switches`.
     pub means: Vec<(&'static str, f64)>,
@@ -314,7 +314,7 @@ fn trajectory_score(
         .collect();
     let metric = TrajectoryGospa::new(options.cutoff, options.order, 0.5 * options.cutoff)?;
     let score = metric.score(&truth, &tracks)?;
-    Ok((score.parts.sum() / times.len().max(1) as f64, score.switches))
+    Ok((score.parts.sum() / times.len() as f64, score.switches))
 }
 
 /// The unbroken pieces of a trajectory over these times.
@@ -337,7 +337,8 @@ fn means(
     errors: &Errors,
     (tgospa, tgospa_switches): (f64, f64),
 ) -> Vec<(&'static str, f64)> {
-    let count = instants.len().max(1) as f64;
+    // Without a time in common there is no figure: not a number, rather than a perfect score.
+    let count = instants.len() as f64;
     let mean = |value: fn(&Instant) -> f64| instants.iter().map(value).sum::<f64>() / count;
     let objects: usize = instants.iter().map(|instant| instant.objects).sum();
     let covered: usize = instants.iter().map(|instant| instant.covered).sum();

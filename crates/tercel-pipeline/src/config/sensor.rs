@@ -90,7 +90,10 @@ pub struct Bearing {
 
 /// Probability of detection.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "expected a probability, or a table such as [[60.0, 0.9], [110.0, 0.0]]")]
+#[serde(
+    untagged,
+    expecting = "expected a probability, 0 to 1, or a table of ranges (m) and probabilities such as [[60.0, 0.9], [110.0, 0.0]]"
+)]
 pub enum DetectionConfig {
     /// The same everywhere, 0 to 1.
     Uniform(#[schemars(extend("x-unit" = "1"))] Probability),
