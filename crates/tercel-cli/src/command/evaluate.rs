@@ -64,7 +64,8 @@ impl EvaluateArguments {
         };
         let evaluation = self.score.evaluate(&tracks, &truths, times, console)?;
         if evaluation.instants.is_empty() {
-            console.warn("there is no time at which both tracks and truth are known");
+            return Err(Failure::input("there is no time at which both tracks and truth are known")
+                .with_help("the times of both must be seconds of the same epoch"));
         }
         match &self.output {
             Some(Target::File(path)) => write_metrics(path, &self.metrics(&evaluation))?,
