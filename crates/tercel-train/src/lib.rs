@@ -1,1 +1,9 @@
-//! x
+//! Training.
+pub mod backend;
+mod error;
+mod hash;
+pub mod layer;
+mod parameters;
+
+pub use error::TrainError;
+pub use parameters::{Initial, Parameter, ParameterId, ParameterSet, Weights};
