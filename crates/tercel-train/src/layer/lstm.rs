@@ -125,7 +125,6 @@ impl Pass {
             (place(n), n.checked_sub(1).map(place))
         })
     }
-    }
 }
 
 /// The layer over a sequence, as one operation on `x`, `W`, `U`, `b`, the first output and the first cell.
