@@ -7,5 +7,9 @@ pub mod layer;
 pub mod optimiser;
 mod parameters;
 
+pub mod recipe;
+mod store;
+pub mod trainer;
+
 pub use error::TrainError;
 pub use parameters::{Initial, Parameter, ParameterId, ParameterSet, Weights};

@@ -130,6 +130,11 @@ impl AdamW {
         Self { config, updates: 0, first: zeros.clone(), second: zeros }
     }
 
+    /// The learning rate at its highest.
+    pub fn top_rate(&self) -> f64 {
+        self.config.rate
+    }
+
     /// The number of updates taken so far.
     pub fn updates(&self) -> u64 {
         self.updates

@@ -13,6 +13,7 @@ use rand_distr::{Distribution, StandardNormal, Uniform};
 use crate::TrainError;
 use crate::backend::{self, Tape, Tensor};
 use crate::hash::fnv1a;
+use crate::store::Named;
 
 /// Where the values of a parameter come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +57,11 @@ impl Parameter {
     /// The values, row after row.
     pub fn values(&self) -> &[f32] {
         &self.values
+    }
+
+    /// The parameter as a tensor of a file, with a prefix before its name.
+    pub(crate) fn to_named(&self, prefix: &str) -> Named {
+        (format!("{prefix}{}", self.name), self.shape.clone(), self.values.clone())
     }
 
     fn rows_and_columns(&self) -> [usize; 2] {
@@ -154,12 +160,12 @@ impl ParameterSet {
         self.entries.iter().find(|entry| entry.name == name)
     }
 
-    /// Takes over the values of a set of the same layout.
+    /// Takes over the values of tensors with the same names and shapes.
     ///
     /// # Errors
     ///
     /// If names or shapes differ; the first that does is named.
-    pub fn assign(&mut self, values: &[(String, Vec<usize>, Vec<f32>)]) -> Result<(), TrainError> {
+    pub(crate) fn assign(&mut self, values: &[Named]) -> Result<(), TrainError> {
         for entry in &self.entries {
             let fault = |problem| TrainError::Parameter { name: entry.name.clone(), problem };
             let (_, shape, _) = values
