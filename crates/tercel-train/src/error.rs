@@ -38,6 +38,9 @@ pub enum TrainError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A model that cannot be written or read.
+    #[error(transparent)]
+    Model(#[from] tercel_neural::ModelError),
     /// A checkpoint that cannot be resumed from.
     #[error("checkpoint {path}: {problem}", path = path.display())]
     Checkpoint {

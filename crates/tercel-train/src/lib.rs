@@ -3,6 +3,7 @@ pub mod backend;
 mod check;
 mod error;
 mod hash;
+pub mod kalman;
 pub mod layer;
 pub mod optimiser;
 mod parameters;

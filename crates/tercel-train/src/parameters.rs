@@ -5,6 +5,8 @@
 //! or on the number of threads. Each graph gets leaves of its own ([`Weights`]), because graphs that share a leaf would
 //! share a lock. This is why the `Module` of burn, which holds tensors, is not used.
 
+use std::collections::BTreeMap;
+
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -158,6 +160,15 @@ impl ParameterSet {
     /// The parameter of that name.
     pub fn get(&self, name: &str) -> Option<&Parameter> {
         self.entries.iter().find(|entry| entry.name == name)
+    }
+
+    /// The parameters as the tensors of a model.
+    pub fn tensors(&self) -> BTreeMap<String, tercel_neural::Tensor> {
+        let tensor = |entry: &Parameter| {
+            let (shape, values) = (entry.shape.clone(), entry.values.clone());
+            (entry.name.clone(), tercel_neural::Tensor { shape, values })
+        };
+        self.entries.iter().map(tensor).collect()
     }
 
     /// Takes over the values of tensors with the same names and shapes.

@@ -71,7 +71,7 @@ pub struct Recipe<K: Kind> {
     #[serde(default)]
     pub schedule: ScheduleConfig,
     #[serde(skip)]
-    hash: u64,
+    text: String,
 }
 
 impl<K: Kind> Recipe<K> {
@@ -92,12 +92,17 @@ impl<K: Kind> Recipe<K> {
         }
         recipe.optimiser.validate()?;
         recipe.schedule.validate()?;
-        Ok(Self { hash: fnv1a(text.as_bytes()), ..recipe })
+        Ok(Self { text: text.to_owned(), ..recipe })
     }
 
     /// The hash of the text, as 16 hexadecimal digits: tells whether a checkpoint or model belongs to the recipe.
     pub fn hash(&self) -> String {
-        format!("{:016x}", self.hash)
+        format!("{:016x}", fnv1a(self.text.as_bytes()))
+    }
+
+    /// The text that it was read from.
+    pub fn text(&self) -> &str {
+        &self.text
     }
 }
 

@@ -7,7 +7,6 @@ mod task;
 #[cfg(test)]
 mod tests;
 
-use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -18,6 +17,7 @@ use rand_chacha::rand_core::SeedableRng;
 
 pub use curve::Row;
 pub use task::{Draw, Loss, Split, Task};
+use tercel_neural::{Card, DataSizes, Model};
 
 use crate::optimiser::{AdamW, Cosine};
 use crate::recipe::{Kind, Recipe, ScheduleConfig, UpdateEach};
@@ -59,13 +59,26 @@ pub struct Run {
     pub resume: bool,
     /// Threads; there is use for as many as there are shards. The result does not depend on them.
     pub threads: usize,
+    /// What the card says of the circumstances.
+    pub stamp: Stamp,
+}
+
+/// Entries of the model card that only the caller knows. Empty ones stay empty.
+#[derive(Debug, Clone, Default)]
+pub struct Stamp {
+    /// The day: `2026-01-31`.
+    pub trained: String,
+    /// The git revision of the program.
+    pub revision: String,
+    /// The licence of the weights.
+    pub licence: String,
 }
 
 impl Run {
     /// A fresh training on all cores.
     pub fn new(model: impl Into<PathBuf>) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { model: model.into(), resume: false, threads }
+        Self { model: model.into(), resume: false, threads, stamp: Stamp::default() }
     }
 
     /// The checkpoint: all that is needed to go on.
@@ -105,9 +118,6 @@ pub enum End {
     Stopped,
 }
 
-/// Metadata of the model file, made from what is known after an epoch: the model card.
-pub type Metadata<'a> = &'a dyn Fn(&Row, &ParameterSet) -> HashMap<String, String>;
-
 /// Trains a task as a recipe says.
 ///
 /// After each epoch the model is validated. The model file is written when it is the best so far, then the checkpoint and
@@ -126,7 +136,6 @@ pub fn train<K: Kind, T: Task>(
     task: &T,
     initial: ParameterSet,
     run: &Run,
-    metadata: Metadata<'_>,
     observer: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Summary, TrainError> {
     for path in [run.model.clone(), run.checkpoint(), run.curve()] {
@@ -144,20 +153,36 @@ pub fn train<K: Kind, T: Task>(
         Checkpoint::fresh(AdamW::new(recipe.optimiser.clone(), &initial), initial)
     };
     let schedule = &recipe.schedule;
-    let mut trainer =
-        Trainer { seed: recipe.seed, hash: recipe.hash(), schedule, task, run, metadata, state };
+    let card = started_card(recipe, task, run);
+    let mut trainer = Trainer { seed: recipe.seed, card, schedule, task, run, state };
     let end = trainer.epochs(observer)?;
     let Checkpoint { parameters: last, best, best_epoch, curve, .. } = trainer.state;
     Ok(Summary { best, last, curve, best_epoch, end })
 }
 
+/// The card of the model, with all that is known before the first epoch.
+fn started_card<K: Kind, T: Task>(recipe: &Recipe<K>, task: &T, run: &Run) -> Card {
+    let samples = |split| task.samples(split) as u64;
+    Card {
+        name: recipe.name.clone(),
+        recipe: recipe.text().to_owned(),
+        recipe_hash: recipe.hash(),
+        seed: recipe.seed,
+        data: DataSizes { training: samples(Split::Training), validation: samples(Split::Validation) },
+        note: recipe.note.clone(),
+        revision: run.stamp.revision.clone(),
+        trained: run.stamp.trained.clone(),
+        licence: run.stamp.licence.clone(),
+        ..task.card()
+    }
+}
+
 struct Trainer<'a, T: Task> {
     seed: u64,
-    hash: String,
+    card: Card,
     schedule: &'a ScheduleConfig,
     task: &'a T,
     run: &'a Run,
-    metadata: Metadata<'a>,
     state: Checkpoint,
 }
 
@@ -270,14 +295,22 @@ impl<T: Task> Trainer<'_, T> {
         Ok(whole)
     }
 
+    /// The parameters as a model, with what is known of them after this epoch.
+    fn model(&self, row: &Row) -> Result<Model, TrainError> {
+        let mut card = self.card.clone();
+        card.epochs = (row.epoch + 1) as u32;
+        let parts = row.validation_parts.iter().map(|(name, value)| (format!("validation_{name}"), *value));
+        let losses = [("training_loss".to_owned(), row.loss), ("validation_loss".to_owned(), row.validation)];
+        card.metrics.extend(losses.into_iter().chain(parts).filter_map(|(name, value)| Some((name, value?))));
+        Ok(Model::new(card, self.state.parameters.tensors())?)
+    }
+
     /// The model if it is the best, then the checkpoint, then the curve.
     fn save(&self, row: &Row, best: bool) -> Result<(), TrainError> {
         if best {
-            let metadata = (self.metadata)(row, &self.state.parameters);
-            let tensors = self.state.parameters.iter().map(|entry| entry.to_named(""));
-            store::write(&self.run.model, &store::pack(tensors, metadata)?)?;
+            self.model(row)?.save(&self.run.model)?;
         }
-        self.state.write(&self.run.checkpoint(), &self.hash)?;
+        self.state.write(&self.run.checkpoint(), &self.card.recipe_hash)?;
         let lines: Vec<String> = self.state.curve.iter().map(Row::line).collect();
         store::write(&self.run.curve(), lines.concat().as_bytes())
     }

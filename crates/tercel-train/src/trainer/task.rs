@@ -4,6 +4,7 @@ use std::fmt;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
+use tercel_neural::Card;
 
 use crate::backend::Tensor;
 use crate::{TrainError, Weights};
@@ -71,6 +72,10 @@ pub trait Task: Sync {
     type Batch: Send;
     /// What is carried from one window of truncated back-propagation to the next: detached states. `()` without windows.
     type Memory: Send;
+
+    /// The card of the model as far as the task knows it: kind, state, sizes and options, scales. The trainer fills in the
+    /// rest.
+    fn card(&self) -> Card;
 
     /// The number of samples of a split.
     fn samples(&self, split: Split) -> usize;

@@ -7,9 +7,9 @@ use rand::RngExt;
 use serde::Deserialize;
 
 use super::*;
+use crate::Weights;
 use crate::backend::constant;
 use crate::layer::{Activation, Linear, Lstm, LstmState};
-use crate::{Weights, store};
 
 #[derive(Debug)]
 struct Wave;
@@ -55,6 +55,10 @@ impl WaveTask {
 impl Task for WaveTask {
     type Batch = Batch;
     type Memory = LstmState;
+
+    fn card(&self) -> Card {
+        Card::new("", "wave", &["value"])
+    }
 
     fn samples(&self, split: Split) -> usize {
         match split {
@@ -111,10 +115,6 @@ fn recipe(schedule: &str) -> Recipe<Wave> {
     Recipe::parse(&text).unwrap()
 }
 
-fn no_metadata(_: &Row, _: &ParameterSet) -> HashMap<String, String> {
-    HashMap::new()
-}
-
 fn go_on(_: Progress<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
@@ -127,7 +127,7 @@ fn trained(folder: &std::path::Path, schedule: &str, windows: usize, run: &Run, 
         Progress::Epoch { row, .. } if row.epoch + 1 == epochs => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     };
-    train(&recipe(schedule), &task, set, &run, &no_metadata, &mut observer).unwrap()
+    train(&recipe(schedule), &task, set, &run, &mut observer).unwrap()
 }
 
 fn run(threads: usize, resume: bool) -> Run {
@@ -164,7 +164,7 @@ fn a_training_killed_within_an_epoch_goes_on_from_the_last_whole_one() {
         Progress::Batch { epoch: 1, done: 2, .. } => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     };
-    train(&recipe("epochs = 3"), &task, set, &place, &no_metadata, &mut observer).unwrap();
+    train(&recipe("epochs = 3"), &task, set, &place, &mut observer).unwrap();
     let rest = trained(killed.path(), "epochs = 3", 1, &run(1, true), 99);
     assert_eq!(rest.last, whole.last);
 }
@@ -205,10 +205,12 @@ fn a_wave_is_learned_and_the_best_epoch_is_the_model() {
     let best = validation.iter().copied().fold(f64::INFINITY, f64::min);
     assert_eq!(validation[summary.best_epoch], best);
     assert!(best < 0.1 * validation[0], "{best} of {}", validation[0]);
-    let (tensors, _) = store::unpack(&fs::read(folder.path().join("wave.safetensors")).unwrap()).unwrap();
-    let (_, mut set) = WaveTask::new(3);
-    set.assign(&tensors).unwrap();
-    assert_eq!(set, summary.best);
+    let model = Model::open(&folder.path().join("wave.safetensors")).unwrap();
+    assert_eq!(*model.tensors(), summary.best.tensors());
+    let card = model.card();
+    assert_eq!((card.name.as_str(), card.kind.as_str(), card.data.training), ("wave", "wave", 22));
+    assert_eq!(card.epochs as usize, summary.best_epoch + 1);
+    assert!((card.metrics["validation_loss"] - best).abs() < 1e-12);
     let curve = fs::read_to_string(folder.path().join("wave.curve.ndjson")).unwrap();
     let rows: Vec<Row> = curve.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(rows.len(), 40);
@@ -221,11 +223,11 @@ fn batches_that_are_not_finite_are_skipped_and_counted() {
     let (mut task, set) = WaveTask::new(1);
     task.broken = |sample| sample == 4;
     let place = Run { model: folder.path().join("wave.safetensors"), ..run(1, false) };
-    let summary = train(&recipe("epochs = 2"), &task, set.clone(), &place, &no_metadata, &mut go_on).unwrap();
+    let summary = train(&recipe("epochs = 2"), &task, set.clone(), &place, &mut go_on).unwrap();
     assert!(summary.curve.iter().all(|row| row.skipped == 1 && row.loss.is_some()));
     assert!(summary.last.iter().all(|entry| entry.values().iter().all(|value| value.is_finite())));
     task.broken = |_| true;
-    let error = train(&recipe("epochs = 2"), &task, set, &place, &no_metadata, &mut go_on).unwrap_err();
+    let error = train(&recipe("epochs = 2"), &task, set, &place, &mut go_on).unwrap_err();
     assert!(matches!(error, TrainError::Diverged { epoch: 0, batches: 3 }), "{error}");
 }
 
@@ -237,7 +239,7 @@ fn a_training_without_progress_ends_early() {
     let text = "version = 1\nkind = \"wave\"\nname = \"wave\"\n[data]\n[model]\n[optimiser]\nrate = 1e-30\nweight_decay = 0.0\n\
                 [schedule]\nbatch = 8\nepochs = 50\npatience = 3\n";
     let recipe = Recipe::<Wave>::parse(text).unwrap();
-    let summary = train(&recipe, &task, set, &place, &no_metadata, &mut go_on).unwrap();
+    let summary = train(&recipe, &task, set, &place, &mut go_on).unwrap();
     assert_eq!((summary.end, summary.curve.len()), (End::Early, 4));
 }
 
@@ -247,7 +249,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_what_helps() {
     let (task, set) = WaveTask::new(1);
     let place = Run { model: folder.path().join("wave.safetensors"), ..run(1, true) };
     let attempt = |recipe: &Recipe<Wave>| {
-        train(recipe, &task, set.clone(), &place, &no_metadata, &mut go_on).unwrap_err().to_string()
+        train(recipe, &task, set.clone(), &place, &mut go_on).unwrap_err().to_string()
     };
     assert!(attempt(&recipe("epochs = 2")).contains("start without resuming"));
     trained(folder.path(), "epochs = 2", 1, &run(1, false), 99);
@@ -267,12 +269,11 @@ fn a_target_that_cannot_be_written_fails_before_the_first_step() {
         ControlFlow::Continue(())
     };
     let place = Run { model: folder.path().join("missing").join("wave.safetensors"), ..run(1, false) };
-    let error =
-        train(&recipe("epochs = 1"), &task, set.clone(), &place, &no_metadata, &mut observer).unwrap_err();
+    let error = train(&recipe("epochs = 1"), &task, set.clone(), &place, &mut observer).unwrap_err();
     assert!(error.to_string().contains("missing"), "{error}");
     let empty = WaveTask { validation: 0, ..task };
     let place = Run { model: folder.path().join("wave.safetensors"), ..place };
-    let error = train(&recipe("epochs = 1"), &empty, set, &place, &no_metadata, &mut observer).unwrap_err();
+    let error = train(&recipe("epochs = 1"), &empty, set, &place, &mut observer).unwrap_err();
     assert!(error.to_string().contains("validation"), "{error}");
     assert_eq!(*steps.borrow(), 0);
 }
@@ -293,8 +294,7 @@ fn a_target_that_fails_later_leaves_the_last_good_model() {
         ControlFlow::Continue(())
     };
     let recipe = recipe("epochs = 3");
-    let error = train(&recipe, &task, set, &place, &no_metadata, &mut observer).unwrap_err();
+    let error = train(&recipe, &task, set, &place, &mut observer).unwrap_err();
     assert!(error.to_string().contains("checkpoint"), "{error}");
-    let found = fs::read(&place.model).unwrap();
-    assert!(store::unpack(&found).is_ok() && !good.borrow().is_empty());
+    assert!(Model::open(&place.model).is_ok() && !good.borrow().is_empty());
 }
