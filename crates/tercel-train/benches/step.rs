@@ -1,10 +1,12 @@
 //! Time of a training step: `cargo bench -p tercel-train --bench step`.
 //!
-//! All on one core. For comparison, on the machine where the figures in the documentation were taken: the LSTM step takes
-//! PyTorch 0.31 to 0.42 s.
+//! All on one core, except where threads are named. For comparison, on the machine where the figures in the documentation were taken: the LSTM step takes
+//! PyTorch 0.31 to 0.42 s, and that of KalmanNet #2 1.01 s.
 
 use divan::Bencher;
+use tercel_train::backend::Tensor;
 use tercel_train::backend::constant;
+use tercel_train::kalman;
 use tercel_train::layer::{Activation, Linear, Lstm};
 use tercel_train::optimiser::{AdamW, OptimiserConfig};
 use tercel_train::{ParameterSet, Weights};
@@ -37,5 +39,96 @@ fn lstm_two_layers(bencher: Bencher) {
         let loss = (error.clone() * error).mean().reshape([1, 1]);
         let gradients = weights.gradients(&loss);
         optimiser.step(&mut set, &gradients, 1e-3)
+    });
+}
+
+/// One update of KalmanNet on 128 flights of 200 steps: data, forward, backward, AdamW.
+mod kalman_net {
+    use super::*;
+    use tercel_train::recipe::Recipe;
+    use tercel_train::task::kalman_net::{KalmanNetKind, KalmanNetTask};
+    use tercel_train::trainer::{Draw, Loss, Split, Task};
+
+    const HEAD: &str = "version = 1\nkind = \"kalman-net\"\nname = \"net\"\nseed = 4\n[data]\n[model]\nzero_gain = true\n\
+                        [model.network]\ncovariance = \"joseph\"\ngain_offset = [[0.4, 0.0], [0.0, 0.4], [0.1, 0.0], [0.0, \
+                        0.1]]\n";
+    const PAPER: &str = "normalise = true\nmagnitudes = false\nsensor_frame = false\n";
+    const OURS: &str = "normalise = true\nmagnitudes = true\nsensor_frame = true\n";
+    const ONE: &str = "features = [\"f2\", \"f4\"]\n[model.network.architecture]\nkind = \"architecture-1\"\ninput = 480\n\
+                       hidden = 200\nlayers = 1\nhead = 32\n";
+    const TWO: &str = "features = [\"f1\", \"f2\", \"f3\", \"f4\"]\n[model.network.architecture]\nkind = \
+                       \"architecture-2\"\nin_mult = 5\nout_mult = 40\n";
+
+    fn update(bencher: Bencher, options: &str, architecture: &str) {
+        let recipe = Recipe::<KalmanNetKind>::parse(&format!("{HEAD}{options}{architecture}")).unwrap();
+        let (task, mut set) = KalmanNetTask::new(&recipe).unwrap();
+        let mut optimiser = AdamW::new(OptimiserConfig::default(), &set);
+        let samples: Vec<u64> = (0..128).collect();
+        bencher.bench_local(|| {
+            let draw = Draw { split: Split::Training, epoch: 0, seed: 4, samples: &samples };
+            let rollout = task.batch(draw).unwrap();
+            let weights = Weights::trainable(&set);
+            let Loss { value, .. } = task.loss(&weights, &rollout, 0, &mut None).unwrap();
+            let gradients = weights.gradients(&value);
+            optimiser.step(&mut set, &gradients, 1e-4)
+        });
+    }
+
+    #[divan::bench(sample_count = 10, sample_size = 1)]
+    fn architecture_1(bencher: Bencher) {
+        update(bencher, PAPER, ONE);
+    }
+
+    #[divan::bench(sample_count = 10, sample_size = 1)]
+    fn architecture_2(bencher: Bencher) {
+        update(bencher, PAPER, TWO);
+    }
+
+    #[divan::bench(sample_count = 10, sample_size = 1)]
+    fn architecture_2_ours(bencher: Bencher) {
+        update(bencher, OURS, TWO);
+    }
+
+    /// An epoch of 4 batches in two shards, on one and two threads.
+    #[divan::bench(sample_count = 5, sample_size = 1, args = [1, 2])]
+    fn epoch(bencher: Bencher, threads: usize) {
+        use std::ops::ControlFlow;
+        use tercel_train::trainer::Run;
+        let text = format!("{HEAD}{PAPER}{TWO}[schedule]\nepochs = 1\nbatch = 128\n")
+            .replace("[data]", "[data]\ntraining = 512\nvalidation = 1");
+        let folder = std::env::temp_dir();
+        let run = Run { threads, ..Run::new(folder.join(format!("tercel-bench-{threads}.safetensors"))) };
+        bencher.bench_local(|| {
+            tercel_train::task::train(&text, &run, &mut |_| ControlFlow::Continue(())).unwrap()
+        });
+    }
+}
+
+/// 200 steps of a Kalman filter for 128 objects, forward and backward: prediction, gain, Joseph form, log-likelihood.
+#[divan::bench(sample_count = 20, sample_size = 1)]
+fn kalman_steps(bencher: Bencher) {
+    use nalgebra::Matrix4;
+    let batch = 128;
+    let eye = |n: usize, scale: f32| -> Vec<f32> {
+        (0..n * n).map(|i| if i % (n + 1) == 0 { scale } else { 0.0 }).collect::<Vec<_>>().repeat(batch)
+    };
+    let mut set = ParameterSet::new(1);
+    set.add("noise", &[batch, 4], tercel_train::Initial::Values(eye(2, 2.0))).unwrap();
+    let innovation = numbers(batch * 2);
+    bencher.bench_local(|| {
+        let weights = Weights::trainable(&set);
+        let noise = weights.tensors()[0].clone();
+        let mut covariance = constant(eye(4, 1.0), [batch, 16]);
+        let mut losses: Vec<Tensor> = Vec::new();
+        for _ in 0..200 {
+            let predicted =
+                kalman::predicted(covariance, &(Matrix4::identity() * 0.98), &Matrix4::identity());
+            let s = kalman::innovation_covariance(predicted.clone(), noise.clone());
+            let gain = kalman::gain(predicted.clone(), s.clone());
+            losses.push(kalman::log_likelihood(constant(innovation.clone(), [batch, 2]), s));
+            covariance = kalman::joseph(predicted, gain, noise.clone());
+        }
+        let loss = Tensor::cat(losses, 0).mean().reshape([1, 1]);
+        weights.gradients(&loss)
     });
 }

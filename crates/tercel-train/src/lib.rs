@@ -10,6 +10,7 @@ mod parameters;
 
 pub mod recipe;
 mod store;
+pub mod task;
 pub mod trainer;
 
 pub use error::TrainError;

@@ -1,0 +1,32 @@
+//! The tasks: one module for each kind of model.
+
+pub mod flights;
+pub mod kalman_net;
+
+use std::ops::ControlFlow;
+
+use crate::TrainError;
+use crate::check::refused;
+use crate::recipe;
+use crate::trainer::{Progress, Run, Summary};
+
+/// The kinds of recipes.
+pub const KINDS: [&str; 1] = [<kalman_net::KalmanNetKind as recipe::Kind>::NAME];
+
+/// Trains what a recipe describes; its kind chooses the task.
+///
+/// # Errors
+///
+/// If the recipe is refused, or the training fails.
+pub fn train(
+    recipe: &str,
+    run: &Run,
+    observer: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+) -> Result<Summary, TrainError> {
+    match recipe::kind(recipe)?.as_str() {
+        "kalman-net" => kalman_net::train(recipe, run, observer),
+        other => {
+            Err(refused("kind", format!("{other:?}"), format!("there are the kinds {}", KINDS.join(", "))))
+        }
+    }
+}
