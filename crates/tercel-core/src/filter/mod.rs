@@ -23,6 +23,7 @@ mod rao_blackwell;
 mod sampling;
 mod sigma;
 mod transition;
+mod turn_bank;
 mod unscented;
 
 use nalgebra::{SMatrix, Vector2};
@@ -40,6 +41,7 @@ pub use particle::{Particle, Particles};
 pub use rao_blackwell::{Hypotheses, Hypothesis, RandomTurns, RaoBlackwellised, Regime, Turning};
 pub use sigma::SigmaPoints;
 pub use transition::Transition;
+pub use turn_bank::TurnBank;
 pub use unscented::Unscented;
 
 /// A recursion over a belief about one object, whose state has `N` components.

@@ -109,7 +109,7 @@ impl TurnBank {
     /// When there is no sensor, or the transition does not fit the number of rates.
     pub fn estimating<S: Clone>(&self, sensors: &[S]) -> Result<Imm<Kalman<Turn, S>>, FilterError> {
         let accuracy = (Transition::sticky(1.0), sensors.len());
-        let transition = Transition::product(accuracy, (self.transition.clone(), self.rates.len()))?;
+        let transition = Transition::joint([accuracy, (self.transition.clone(), self.rates.len())]);
         Imm::new(sensors.iter().flat_map(|sensor| self.modes(sensor)), transition)
     }
 

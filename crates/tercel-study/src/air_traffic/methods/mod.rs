@@ -34,7 +34,10 @@ pub const METHODS: [&str; 8] =
 ///
 /// # Errors
 /// When there is no such method.
-pub fn method(name: &str, population: &tercel_sim::air_traffic::AirTraffic) -> Result<Box<dyn Method>, StudyError> {
+pub fn method(
+    name: &str,
+    population: &tercel_sim::air_traffic::AirTraffic,
+) -> Result<Box<dyn Method>, StudyError> {
     Ok(match name {
         "measurement" => Box::new(limits::Measured),
         "ekf" => Box::new(single::StraightExtended),
