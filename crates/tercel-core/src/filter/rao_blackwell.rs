@@ -14,14 +14,14 @@ use super::{Estimate, Filter, Innovation, sampling};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::motion::Motion;
-use crate::sensor::{LinearSensor, Measurement};
+use crate::sensor::{Measurement, Sensor};
 
 pub use belief::{Hypotheses, Hypothesis};
 pub use random_turns::{RandomTurns, Turning};
 pub use regime::Regime;
 
-/// Estimates a state whose motion has parameters that jump at random, with many guesses at the parameters and the exact
-/// Kalman filter for each.
+/// Estimates a state whose motion has parameters that jump at random, with many guesses at the parameters and a Kalman
+/// filter for each: exact given the parameters when the sensor is linear, of first order otherwise.
 ///
 /// ## Recursion
 /// With `θᵢ` the parameters of particle `i`, drawn and moved by a [`Regime`], and `mᵢ, Pᵢ` the state given their history:
@@ -123,7 +123,7 @@ impl<J, S, const M: usize> RaoBlackwellised<J, S, M> {
 impl<const N: usize, const M: usize, J, S> Filter<N> for RaoBlackwellised<J, S, M>
 where
     J: Regime<N>,
-    S: LinearSensor<N, M>,
+    S: Sensor<N, M>,
 {
     type Belief = Hypotheses<J::Parameters, N>;
     type Measurement = Measurement<M>;

@@ -3,9 +3,9 @@
 use nalgebra::Matrix2;
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Filter, Imm, ImmBelief, Kalman, Transition, TurnBank};
+use tercel_core::filter::{Extended, Filter, Imm, ImmBelief, Transition, TurnBank};
 use tercel_core::motion::{AccelerationNoise, Turn};
-use tercel_core::sensor::{ConvertedPolar, Measurement, Position};
+use tercel_core::sensor::{Measurement, Position, RangeBearing};
 
 use super::{Plot, follow, stated};
 use crate::air_traffic::{Method, Recording, StepEstimate};
@@ -15,9 +15,9 @@ pub(super) const NOMINAL: (f64, f64) = (50.0, 0.5 * std::f64::consts::PI / 180.0
 
 type Belief = ImmBelief<Gaussian<4>, 4>;
 
-fn read<S>(bank: &TurnBank, filter: &Imm<Kalman<Turn, S>>, belief: &Belief) -> StepEstimate
+fn read<S>(bank: &TurnBank, filter: &Imm<Extended<Turn, S>>, belief: &Belief) -> StepEstimate
 where
-    Kalman<Turn, S>: Filter<4, Belief = Gaussian<4>>,
+    Extended<Turn, S>: Filter<4, Belief = Gaussian<4>>,
 {
     let state = filter.state(belief);
     StepEstimate {
@@ -30,7 +30,7 @@ where
 /// The IMM with which the AttEnsKNets paper compares: straight flight and turns at ±10 °/s, position noise `1250 I` m².
 pub(super) struct Published {
     bank: TurnBank,
-    filter: Imm<Kalman<Turn, Position>>,
+    filter: Imm<Extended<Turn, Position>>,
 }
 
 impl Published {
@@ -78,7 +78,7 @@ fn turns() -> Result<TurnBank, FilterError> {
 /// A bank of turns that believes the radar's stated accuracy.
 pub struct Bank {
     bank: TurnBank,
-    filter: Imm<Kalman<Turn, ConvertedPolar>>,
+    filter: Imm<Extended<Turn, RangeBearing>>,
 }
 
 impl Bank {
@@ -88,7 +88,7 @@ impl Bank {
     /// When its transition does not fit its rates.
     pub fn new(bank: TurnBank) -> Result<Self, FilterError> {
         // The accuracy comes with each measurement; this one is never used.
-        let filter = bank.filter(ConvertedPolar::new(NOMINAL.0, NOMINAL.1)?)?;
+        let filter = bank.filter(RangeBearing::new(NOMINAL.0, NOMINAL.1)?)?;
         Ok(Bank { bank, filter })
     }
 
@@ -112,7 +112,7 @@ impl Method for Bank {
 /// A bank of turns that is told nothing of the radar's accuracy, and estimates it.
 pub struct AdaptiveBank {
     bank: TurnBank,
-    filter: Imm<Kalman<Turn, ConvertedPolar>>,
+    filter: Imm<Extended<Turn, RangeBearing>>,
 }
 
 impl AdaptiveBank {
@@ -122,7 +122,7 @@ impl AdaptiveBank {
     /// When an accuracy is not positive, or the bank's transition does not fit its rates.
     pub fn new(bank: TurnBank, accuracies: &[(f64, f64)]) -> Result<Self, FilterError> {
         let radars: Result<Vec<_>, _> =
-            accuracies.iter().map(|&(range, bearing)| ConvertedPolar::new(range, bearing)).collect();
+            accuracies.iter().map(|&(range, bearing)| RangeBearing::new(range, bearing)).collect();
         let filter = bank.estimating(&radars?)?;
         Ok(AdaptiveBank { bank, filter })
     }

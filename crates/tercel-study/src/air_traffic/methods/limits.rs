@@ -3,9 +3,9 @@
 use nalgebra::Vector4;
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Filter, Kalman, RandomTurns, RaoBlackwellised};
+use tercel_core::filter::{Extended, Filter, RandomTurns, RaoBlackwellised};
 use tercel_core::motion::{AccelerationNoise, Turn};
-use tercel_core::sensor::ConvertedPolar;
+use tercel_core::sensor::RangeBearing;
 use tercel_sim::air_traffic::{AirTraffic, Manoeuvre};
 
 use super::{Plot, follow, stated};
@@ -29,18 +29,18 @@ impl Method for Measured {
     }
 }
 
-/// A Kalman filter that is told every turn rate, the acceleration noise and the accuracy of the radar.
+/// An extended Kalman filter that is told every turn rate, the acceleration noise and the accuracy of the radar.
 pub(super) struct Oracle;
 
 impl Method for Oracle {
     fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
         let flight = &recording.flight;
-        let radar = ConvertedPolar::new(recording.radar.range(), recording.radar.bearing())?;
+        let radar = RangeBearing::new(recording.radar.range(), recording.radar.bearing())?;
         let noise = AccelerationNoise::Piecewise(flight.acceleration());
         let mut belief: Option<Gaussian<4>> = None;
         let mut estimates = Vec::with_capacity(recording.plots.len());
         for (rate, plot) in flight.rates().iter().zip(&recording.plots) {
-            let filter = Kalman::new(Turn::with_noise(*rate, noise).with_speed(300.0), radar);
+            let filter = Extended::new(Turn::with_noise(*rate, noise).with_speed(300.0), radar);
             if let Some(belief) = &mut belief {
                 filter.predict(belief, flight.interval());
             }
@@ -92,7 +92,7 @@ impl Bayes {
 
 impl Method for Bayes {
     fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
-        let radar = ConvertedPolar::new(recording.radar.range(), recording.radar.bearing())?;
+        let radar = RangeBearing::new(recording.radar.range(), recording.radar.bearing())?;
         let filter = RaoBlackwellised::new(self.turns()?, radar, PARTICLES, recording.seed ^ recording.run)?;
         let measure = |plot: &Plot| stated(plot, recording);
         follow(recording, &filter, measure, measure, |belief| {

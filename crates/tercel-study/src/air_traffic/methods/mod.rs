@@ -5,7 +5,7 @@
 //! | `measurement` | | the plot as it came; no velocity |
 //! | `ekf`, `ukf` | the radar's accuracy | one straight motion, polar measurements |
 //! | `imm-paper` | | the published rival: three modes, a position noise of 35 m |
-//! | `imm` | the radar's accuracy | ours: turns to ±20 °/s, converted measurements |
+//! | `imm` | the radar's accuracy | ours: turns to ±20 °/s, polar measurements |
 //! | `imm-adaptive` | | the same when the accuracy is not stated: it is estimated |
 //! | `bayes` | the radar's accuracy, the population | the limit of any causal filter |
 //! | `oracle` | the radar's accuracy, every manoeuvre | a bound that no filter reaches |
@@ -20,6 +20,7 @@ mod single;
 use tercel_core::error::FilterError;
 use tercel_core::filter::Filter;
 use tercel_core::sensor::Measurement;
+use tercel_sim::air_traffic::AirTraffic;
 
 use super::{Method, Recording, StepEstimate};
 use crate::error::StudyError;
@@ -34,10 +35,7 @@ pub const METHODS: [&str; 8] =
 ///
 /// # Errors
 /// When there is no such method.
-pub fn method(
-    name: &str,
-    population: &tercel_sim::air_traffic::AirTraffic,
-) -> Result<Box<dyn Method>, StudyError> {
+pub fn method(name: &str, population: &AirTraffic) -> Result<Box<dyn Method>, StudyError> {
     Ok(match name {
         "measurement" => Box::new(limits::Measured),
         "ekf" => Box::new(single::StraightExtended),
