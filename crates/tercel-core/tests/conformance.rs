@@ -106,25 +106,25 @@ conformance!(
 conformance!(
     rao_blackwellised_filter_of_one_mode,
     positions::<4, _, _>(Expectations::exact(), |p| {
-        RaoBlackwellised::new(regimes::Equal::of(p, 1), p.sensor(), 3, 1).unwrap()
+        RaoBlackwellised::new(regimes::Equal::of(p, 1), p.sensor(), 2, 1).unwrap()
     })
 );
 conformance!(
     rao_blackwellised_filter_of_equal_modes,
-    positions::<4, _, _>(Expectations::exact(), |p| {
+    positions::<4, _, _>(Expectations { extremes: false, ..Expectations::exact() }, |p| {
         RaoBlackwellised::new(regimes::Equal::of(p, 3), p.sensor(), 6, 1).unwrap()
     })
 );
 conformance!(
     rao_blackwellised_filter_of_levels,
-    positions::<4, _, _>(Expectations { extremes: true, ..Expectations::sampled() }, |p| {
+    positions::<4, _, _>(Expectations::sampled(), |p| {
         RaoBlackwellised::new(regimes::Levels::of(p), p.sensor(), 20, 1).unwrap()
     })
 );
 conformance!(
     rao_blackwellised_filter_of_turns,
     positions::<4, _, _>(Expectations { moments: Some(1e-6), ..Expectations::own_models() }, |p| {
-        RaoBlackwellised::new(regimes::turns(p), p.sensor(), 20, 1).unwrap()
+        RaoBlackwellised::new(regimes::turns(p), p.sensor(), 5, 1).unwrap()
     })
 );
 
