@@ -10,7 +10,7 @@ use super::{Plot, bank::NOMINAL, follow, stated};
 use crate::air_traffic::{Method, Recording, StepEstimate};
 
 /// Acceleration that stands for the turns which a straight motion does not have, m/s² per axis.
-const ACCELERATION: f64 = 25.0;
+const ACCELERATION: f64 = 45.0;
 
 fn motion() -> ConstantVelocity {
     ConstantVelocity::with_noise(AccelerationNoise::Piecewise(ACCELERATION)).with_speed(300.0)
