@@ -68,7 +68,7 @@ struct Pass<'a>(&'a mut [f32], Activation);
 
 impl Kernel for Pass<'_> {
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+    fn run<A: Arithmetic>(self, _: A) {
         match self.1 {
             Activation::Relu => relu_pass(self.0),
             Activation::Exp => self.0.iter_mut().for_each(|x| *x = exp_of::<A>(*x)),
