@@ -218,8 +218,9 @@ impl<'a> Reference<'a> {
 }
 
 /// Runs both over 60 steps of an object that turns, of which a fifth is not measured, and compares states and covariances.
-fn compare(hyper: &KalmanNetHyper) {
-    let model = kalman_net(hyper, 0.6, 7);
+/// Weights are random within `size`, which must not be so large that the filter loses the object.
+fn compare(hyper: &KalmanNetHyper, size: f32) {
+    let model = kalman_net(hyper, size, 7);
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let (motion, radar) = (Turn::new(0.03, 2.0), Position::new(40.0).unwrap());
     let network = Arc::new(GainNetwork::from_model(&model).unwrap());
@@ -254,32 +255,32 @@ fn offset(hyper: KalmanNetHyper) -> KalmanNetHyper {
 
 #[test]
 fn architecture_one_of_the_publication_equals_its_reference() {
-    compare(&offset(KalmanNetHyper::paper(Architecture::one())));
+    compare(&offset(KalmanNetHyper::paper(Architecture::one())), 0.6);
 }
 
 #[test]
 fn architecture_one_for_bent_models_equals_its_reference() {
     let two_layers = Architecture::Stacked { input: 480, hidden: 200, layers: 2, head: 32 };
     let features = vec![Feature::F1, Feature::F3, Feature::F4];
-    compare(&offset(KalmanNetHyper { features, ..KalmanNetHyper::paper(two_layers) }));
+    compare(&offset(KalmanNetHyper { features, ..KalmanNetHyper::paper(two_layers) }), 0.3);
 }
 
 #[test]
 fn architecture_one_without_a_head_equals_its_reference() {
     let headless = Architecture::Stacked { input: 200, hidden: 200, layers: 1, head: 0 };
-    compare(&offset(KalmanNetHyper::paper(headless)));
+    compare(&offset(KalmanNetHyper::paper(headless)), 0.3);
 }
 
 #[test]
 fn architecture_two_of_the_publication_equals_its_reference() {
-    compare(&offset(KalmanNetHyper::paper(Architecture::two())));
+    compare(&offset(KalmanNetHyper::paper(Architecture::two())), 0.6);
 }
 
 #[test]
 fn all_options_together_equal_their_reference() {
     for architecture in [TINY_ONE, TINY_TWO, Architecture::two()] {
         for covariance in [Covariance::Riccati, Covariance::Joseph] {
-            compare(&tiny(architecture, covariance));
+            compare(&tiny(architecture, covariance), 0.6);
         }
     }
 }
@@ -288,12 +289,10 @@ fn all_options_together_equal_their_reference() {
 fn features_in_another_order_and_their_own_length_equal_their_reference() {
     let mut hyper = tiny(TINY_ONE, Covariance::Joseph);
     hyper.features = vec![Feature::F4, Feature::F2, Feature::F1];
-    compare(&hyper);
+    compare(&hyper, 0.3);
+    // Features in metres are hundreds of times larger, which the weights must make up for.
     hyper.normalise = false;
-    hyper.gain_offset = Some([[0.5, 0.1], [0.0, 0.6], [0.1, 0.0], [0.02, 0.2]]);
-    // Metres saturate the gates, and the last layer would give gains of hundreds.
-    hyper.features = vec![Feature::F3];
-    compare(&hyper);
+    compare(&hyper, 0.05);
 }
 
 #[test]

@@ -111,7 +111,7 @@ fn split<A: Arithmetic>(x: f32) -> (i32, f32) {
     let mut p = 1.991_852_6e-4;
     p = A::fused(p, r, 1.394_617_7e-3);
     p = A::fused(p, r, 8.333_264e-3);
-    p = A::fused(p, r, 4.166_626_9e-2);
+    p = A::fused(p, r, 4.166_627e-2);
     p = A::fused(p, r, 1.666_666_7e-1);
     p = A::fused(p, r, 0.5);
     let power = A::fused(p, r * r, r) + 1.0;
