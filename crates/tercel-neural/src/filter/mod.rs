@@ -1,0 +1,17 @@
+//! Filters whose weak parts are learned. Each is a [`tercel_core::filter::Filter`], so every tracker takes it.
+//!
+//! | filter | learns | belief |
+//! |---|---|---|
+//! | [`KalmanNet`] | the gain | Gaussian, last differences, memory of a recurrent network |
+//!
+//! A network is loaded once and shared: filters hold it behind an [`Arc`](std::sync::Arc) and are small values beside it, so
+//! one may be built for each scan of a moving sensor. What a network remembers of an object is in the belief, as a
+//! [`Memory`].
+
+mod kalman_net;
+mod memory;
+
+pub use kalman_net::{
+    Architecture, Covariance, Feature, GainNetwork, KalmanNet, KalmanNetBelief, KalmanNetHyper,
+};
+pub use memory::Memory;

@@ -1,0 +1,143 @@
+//! Layers against the same recursions written in double precision, and alone against in a batch.
+
+use super::{Gru, Linear, Lstm, RunningNorm};
+
+fn values(count: usize, seed: usize, size: f32) -> Vec<f32> {
+    (0..count).map(|i| (((i + 31 * seed) * 7919 % 2003) as f32 / 1001.5 - 1.0) * size).collect()
+}
+
+fn product(x: &[f64], weights: &[f32], bias: &[f32]) -> Vec<f64> {
+    let columns = bias.len();
+    let term =
+        |j: usize| x.iter().enumerate().map(|(k, x)| x * f64::from(weights[k * columns + j])).sum::<f64>();
+    (0..columns).map(|j| f64::from(bias[j]) + term(j)).collect()
+}
+
+fn sigma(x: f64) -> f64 {
+    1.0 / (1.0 + (-x).exp())
+}
+
+fn doubled(x: &[f32]) -> Vec<f64> {
+    x.iter().map(|x| f64::from(*x)).collect()
+}
+
+fn close(ours: &[f32], exact: &[f64], tolerance: f64) {
+    assert_eq!(ours.len(), exact.len());
+    for (ours, exact) in ours.iter().zip(exact) {
+        assert!((f64::from(*ours) - exact).abs() < tolerance, "{ours} is not {exact}");
+    }
+}
+
+#[test]
+fn a_gru_follows_its_recursion_for_200_steps() {
+    for (inputs, size) in [(3, 1), (5, 4), (20, 16), (36, 17), (6, 200)] {
+        let (wx, bx) = (values(inputs * 3 * size, 1, 0.4), values(3 * size, 2, 0.3));
+        let (wh, bh) = (values(size * 3 * size, 3, 0.8 / size as f32), values(3 * size, 4, 0.3));
+        let layer = Gru::new(inputs, size, &wx, &bx, &wh, &bh);
+        assert_eq!((layer.inputs(), layer.size()), (inputs, size));
+        let (mut memory, mut scratch) = (vec![0.0; size], vec![0.0; layer.scratch(1)]);
+        let mut exact = vec![0.0; size];
+        for step in 0..200 {
+            let x = values(inputs, 100 + step, 1.0);
+            layer.step(&x, &mut memory, &mut scratch);
+            let (a, b) = (product(&doubled(&x), &wx, &bx), product(&exact, &wh, &bh));
+            for j in 0..size {
+                let (r, z) = (sigma(a[j] + b[j]), sigma(a[size + j] + b[size + j]));
+                let n = (a[2 * size + j] + r * b[2 * size + j]).tanh();
+                exact[j] = (1.0 - z) * n + z * exact[j];
+            }
+        }
+        close(&memory, &exact, 3e-6);
+    }
+}
+
+#[test]
+fn an_lstm_follows_its_recursion_for_200_steps() {
+    for (inputs, size) in [(3, 1), (5, 4), (12, 64), (7, 19)] {
+        let (wx, wh) = (values(inputs * 4 * size, 1, 0.4), values(size * 4 * size, 3, 0.8 / size as f32));
+        let bias = values(4 * size, 2, 0.3);
+        let layer = Lstm::new(inputs, size, &wx, &wh, &bias);
+        assert_eq!((layer.inputs(), layer.size()), (inputs, size));
+        let (mut output, mut cell) = (vec![0.0; size], vec![0.0; size]);
+        let mut scratch = vec![0.0; layer.scratch(1)];
+        let (mut h, mut c) = (vec![0.0; size], vec![0.0; size]);
+        for step in 0..200 {
+            let x = values(inputs, 100 + step, 1.0);
+            layer.step(&x, &mut output, &mut cell, &mut scratch);
+            let (a, b) = (product(&doubled(&x), &wx, &bias), product(&h, &wh, &vec![0.0; 4 * size]));
+            let gate = |k: usize, j: usize| a[k * size + j] + b[k * size + j];
+            for j in 0..size {
+                c[j] = sigma(gate(1, j)) * c[j] + sigma(gate(0, j)) * gate(2, j).tanh();
+                h[j] = sigma(gate(3, j)) * c[j].tanh();
+            }
+        }
+        close(&output, &h, 3e-6);
+        close(&cell, &c, 6e-6);
+    }
+}
+
+#[test]
+fn a_running_norm_is_the_normalisation_of_the_steps_so_far() {
+    let norm = RunningNorm::new(2);
+    let (mut memory, mut y) = (vec![0.0; norm.memory()], [0.0; 2]);
+    let mut seen: Vec<Vec<f64>> = Vec::new();
+    for step in 0..100 {
+        let x = values(2, step, 50.0);
+        seen.push(doubled(&x));
+        norm.step(&x, &mut memory, &mut y);
+        let count = seen.len() as f64;
+        let exact = [0, 1].map(|c| {
+            let mean = seen.iter().map(|x| x[c]).sum::<f64>() / count;
+            let variance = seen.iter().map(|x| (x[c] - mean).powi(2)).sum::<f64>() / count;
+            (seen[step][c] - mean) / (variance + 1e-5).sqrt()
+        });
+        close(&y, &exact, 1e-4);
+    }
+}
+
+#[test]
+fn a_row_gives_the_same_bits_alone_and_in_a_batch() {
+    let (batch, inputs, size) = (5, 9, 21);
+    let gru = Gru::new(
+        inputs,
+        size,
+        &values(inputs * 3 * size, 1, 0.4),
+        &values(3 * size, 2, 0.3),
+        &values(size * 3 * size, 3, 0.1),
+        &values(3 * size, 4, 0.3),
+    );
+    let lstm = Lstm::new(
+        inputs,
+        size,
+        &values(inputs * 4 * size, 5, 0.4),
+        &values(size * 4 * size, 6, 0.1),
+        &values(4 * size, 7, 0.3),
+    );
+    let linear = Linear::new(size, 13, &values(size * 13, 8, 0.5), &values(13, 9, 0.5));
+    let run = |x: &[f32], rows: usize| {
+        let mut scratch = vec![0.0; gru.scratch(rows).max(lstm.scratch(rows))];
+        let [mut memory, mut output, mut cell] = [0; 3].map(|_| vec![0.25; rows * size]);
+        for _ in 0..3 {
+            gru.step(x, &mut memory, &mut scratch);
+            lstm.step(x, &mut output, &mut cell, &mut scratch);
+        }
+        let mut y = vec![0.0; rows * 13];
+        linear.forward_relu(&output, &mut y);
+        [memory, output, cell, y]
+    };
+    let x = values(batch * inputs, 11, 1.0);
+    let together = run(&x, batch);
+    for row in 0..batch {
+        let alone = run(&x[row * inputs..][..inputs], 1);
+        for (alone, together) in alone.iter().zip(&together) {
+            assert_eq!(alone, &together[row * alone.len()..][..alone.len()]);
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "rows of 3 numbers")]
+fn slices_of_different_batches_are_refused() {
+    let layer = Linear::new(2, 3, &[0.0; 6], &[0.0; 3]);
+    layer.forward(&[0.0; 4], &mut [0.0; 3]);
+}
