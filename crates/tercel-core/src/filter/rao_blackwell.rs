@@ -44,7 +44,7 @@ pub use regime::Regime;
 ///
 /// ## Use it when
 /// one wants to know how well any filter could do: with the regime from which objects are truly drawn the estimate tends to
-/// the mean given all measurements so far, which no filter beats. Some thousand particles do, at a third of a microsecond
+/// the mean given all measurements so far, which no filter beats. Some thousand particles do, at a fifth of a microsecond
 /// each and step. It is also a filter for real use where a grid of modes would be too large, as for turn rates and noise
 /// levels that are both unknown.
 ///

