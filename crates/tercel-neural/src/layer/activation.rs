@@ -81,8 +81,11 @@ impl Kernel for Pass<'_> {
 
 #[inline(always)]
 pub(super) fn relu_pass(values: &mut [f32]) {
-    // `f32::max` would turn what is not a number into zero.
-    values.iter_mut().for_each(|x| *x = if *x < 0.0 { 0.0 } else { *x });
+    // `f32::max` would turn what is not a number into zero, and an assignment in one of two branches becomes a masked store.
+    for x in values {
+        let keep = if *x < 0.0 { 0 } else { u32::MAX };
+        *x = f32::from_bits(x.to_bits() & keep);
+    }
 }
 
 #[inline(always)]
