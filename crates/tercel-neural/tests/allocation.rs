@@ -7,8 +7,8 @@ mod untrained;
 use allocation_counter::measure;
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
-use tercel_core::sensor::{ConvertedPolar, Measurement};
-use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper};
+use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
+use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm, NeuralImmHyper};
 use untrained::{TINY_ONE, network, tiny};
 
 /// Allocations in 100 steps after ten, in their comparisons and states, and in copies over a belief of the same sizes.
@@ -49,4 +49,12 @@ fn kalman_nets_do_not_allocate() {
         let filter = KalmanNet::new(network(&hyper, 0.1), ConstantVelocity::new(1.0), radar);
         assert_eq!(allocations(&filter), 0, "{hyper:?}");
     }
+}
+
+#[test]
+fn neural_imms_do_not_allocate() {
+    let network = untrained::neural_imm(&NeuralImmHyper::default(), 0.1, 1);
+    let radars = [0.003, 0.01].map(|bearing| RangeBearing::new(50.0, bearing).unwrap());
+    assert_eq!(allocations(&NeuralImm::new(network.clone(), &radars).unwrap()), 0);
+    assert_eq!(allocations(&NeuralImm::new(network, &radars[..1]).unwrap()), 0);
 }

@@ -7,7 +7,7 @@ use tercel_core::conformance::{Expectations, Problem, positions};
 use tercel_core::filter::{Imm, Transition};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
-use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper};
+use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm};
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
 fn net(hyper: &KalmanNetHyper, problem: &Problem) -> KalmanNet<ConstantVelocity, Position<2>> {
@@ -50,5 +50,11 @@ conformance!(
     positions::<4, _, _>(ORDINARY_TIMES, |p| {
         let modes = [TINY_ONE, TINY_TWO].map(|a| net(&tiny(a, Covariance::Joseph), p));
         Imm::new(modes, Transition::sticky(0.95)).unwrap()
+    })
+);
+conformance!(
+    neural_imm,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        NeuralImm::new(untrained::neural_imm(&untrained::small_bank(), 0.3, 1), &[p.sensor()]).unwrap()
     })
 );
