@@ -4,9 +4,11 @@
 //! |---|---|
 //! | [`evaluate`] | scores tracks against the truth |
 //! | [`report`] | draws a recording, its tracks and scores as one HTML file |
+//! | [`air_traffic`] | studies of one simulated aircraft |
 //! | [`autoferry`] | the study on real radar and lidar |
 //! | [`tune`] | fits the numbers of a configuration to recordings |
 
+pub mod air_traffic;
 pub mod autoferry;
 mod error;
 pub mod evaluate;
