@@ -24,6 +24,9 @@ pub struct StudyTable {
 pub struct Row {
     /// Its name.
     pub method: String,
+    /// Under which condition, by the name of what a study changes from row to row.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<BTreeMap<String, f64>>,
     /// Its figures by the name of the metric.
     pub metrics: BTreeMap<String, Figure>,
     /// Time for one step (a scan), microseconds.
