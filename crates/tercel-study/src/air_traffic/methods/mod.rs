@@ -1,26 +1,52 @@
 //! The methods that the air-traffic studies compare.
+//!
+//! | method | knows | is |
+//! |---|---|---|
+//! | `measurement` | | the plot as it came; no velocity |
+//! | `ekf`, `ukf` | the radar's accuracy | one straight motion, polar measurements |
+//! | `imm-paper` | | the published rival: three modes, a position noise of 35 m |
+//! | `imm` | the radar's accuracy | ours: turns to ±20 °/s, converted measurements |
+//! | `imm-adaptive` | | the same when the accuracy is not stated: it is estimated |
+//! | `bayes` | the radar's accuracy, the population | the limit of any causal filter |
+//! | `oracle` | the radar's accuracy, every manoeuvre | a bound that no filter reaches |
+//!
+//! The suffix `-paper` is the configuration of the publication; a plain name is what we would fly. One configuration serves every
+//! population.
 
-use nalgebra::Vector4;
+mod bank;
+mod limits;
+mod single;
+
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Filter, Kalman};
-use tercel_core::motion::{AccelerationNoise, Turn};
-use tercel_core::sensor::{ConvertedPolar, Measurement};
-use tercel_sim::air_traffic::AirTraffic;
+use tercel_core::filter::Filter;
+use tercel_core::sensor::Measurement;
 
 use super::{Method, Recording, StepEstimate};
 use crate::error::StudyError;
 
-/// Names of all methods, in the order in which they are best read.
-pub const METHODS: [&str; 2] = ["measurement", "oracle"];
+pub use bank::{AdaptiveBank, Bank};
 
-/// The method of that name, for a population.
+/// Names of all methods, in the order in which they are best read.
+pub const METHODS: [&str; 8] =
+    ["measurement", "ekf", "ukf", "imm-paper", "imm", "imm-adaptive", "bayes", "oracle"];
+
+/// The method of that name, for a population (one of [`NAMES`](tercel_sim::air_traffic::NAMES), of which only `bayes` makes use).
 ///
 /// # Errors
 /// When there is no such method.
-pub fn method(name: &str, _population: &AirTraffic) -> Result<Box<dyn Method>, StudyError> {
+pub fn method(
+    name: &str,
+    population: &tercel_sim::air_traffic::AirTraffic,
+) -> Result<Box<dyn Method>, StudyError> {
     Ok(match name {
-        "measurement" => Box::new(Measured),
-        "oracle" => Box::new(Oracle),
+        "measurement" => Box::new(limits::Measured),
+        "ekf" => Box::new(single::StraightExtended),
+        "ukf" => Box::new(single::StraightUnscented),
+        "imm-paper" => Box::new(bank::Published::new()?),
+        "imm" => Box::new(Bank::shipped()?),
+        "imm-adaptive" => Box::new(AdaptiveBank::shipped()?),
+        "bayes" => Box::new(limits::Bayes::new(population.clone())),
+        "oracle" => Box::new(limits::Oracle),
         _ => {
             let known = METHODS.join(", ");
             return Err(StudyError::UnknownMethod { study: "atc", name: name.to_string(), known });
@@ -28,51 +54,38 @@ pub fn method(name: &str, _population: &AirTraffic) -> Result<Box<dyn Method>, S
     })
 }
 
-struct Measured;
-
-impl Method for Measured {
-    fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
-        let mut mean = Vector4::repeat(f64::NAN);
-        let estimate = |plot: &Option<nalgebra::Vector2<f64>>| {
-            if let Some(plot) = plot {
-                let (sine, cosine) = plot.y.sin_cos();
-                mean = Vector4::new(plot.x * cosine, plot.x * sine, f64::NAN, f64::NAN);
-            }
-            StepEstimate { mean, covariance: None, manoeuvres: None }
-        };
-        Ok(recording.plots.iter().map(estimate).collect())
+/// Runs a filter over a recording. The first plot becomes a measurement by `start`, every other by `measure`, and every
+/// belief an estimate by `read`.
+fn follow<F: Filter<4>>(
+    recording: &Recording,
+    filter: &F,
+    start: impl FnOnce(&Plot) -> F::Measurement,
+    measure: impl Fn(&Plot) -> F::Measurement,
+    read: impl Fn(&F::Belief) -> StepEstimate,
+) -> Result<Vec<StepEstimate>, FilterError> {
+    // A recording begins with a plot.
+    let Some((Some(first), rest)) = recording.plots.split_first() else {
+        return Ok(Vec::new());
+    };
+    let mut belief = filter.birth(&start(first))?;
+    let mut estimates = Vec::with_capacity(recording.plots.len());
+    estimates.push(read(&belief));
+    for plot in rest {
+        filter.predict(&mut belief, recording.flight.interval());
+        if let Some(plot) = plot {
+            filter.update(&mut belief, &measure(plot))?;
+        }
+        estimates.push(read(&belief));
     }
+    Ok(estimates)
 }
 
-struct Oracle;
+/// Range and bearing.
+type Plot = nalgebra::Vector2<f64>;
 
-impl Method for Oracle {
-    fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
-        let flight = &recording.flight;
-        let radar = ConvertedPolar::new(recording.radar.range(), recording.radar.bearing())?;
-        let mut belief = None;
-        let mut estimates = Vec::new();
-        for (rate, plot) in flight.rates().iter().zip(&recording.plots) {
-            let _ = AccelerationNoise::Piecewise(1.0);
-            let filter =
-                Kalman::new(Turn::new(*rate, flight.acceleration().powi(2)).with_speed(300.0), radar);
-            if let Some(belief) = &mut belief {
-                filter.predict(belief, flight.interval());
-            }
-            if let Some(plot) = plot {
-                match &mut belief {
-                    Some(belief) => drop(filter.update(belief, &Measurement::from(*plot))?),
-                    None => belief = Some(filter.birth(&Measurement::from(*plot))?),
-                }
-            }
-            let mut told = [0.0; 3];
-            told[tercel_sim::air_traffic::Manoeuvre::of_rate(*rate).index()] = 1.0;
-            estimates.extend(belief.map(|state: tercel_core::belief::Gaussian<4>| StepEstimate {
-                mean: state.mean,
-                covariance: Some(state.covariance),
-                manoeuvres: Some(told),
-            }));
-        }
-        Ok(estimates)
-    }
+/// A plot with the accuracy that the radar's data sheet states.
+fn stated(plot: &Plot, recording: &Recording) -> Measurement<2> {
+    let (range, bearing) = (recording.radar.range(), recording.radar.bearing());
+    let variances = nalgebra::Vector2::new(range * range, bearing * bearing);
+    Measurement::from(*plot).with_noise(nalgebra::Matrix2::from_diagonal(&variances))
 }
