@@ -37,6 +37,14 @@ pub enum StudyError {
         /// Why.
         source: std::io::Error,
     },
+    /// Results could not be written.
+    #[error("cannot write to {}: {source}", path.display())]
+    Output {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A folder holds no recordings of the expected format.
     #[error("{} holds no recording named {expected}", path.display())]
     NoRecordings {

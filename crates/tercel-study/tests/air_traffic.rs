@@ -42,7 +42,10 @@ fn a_study_is_the_same_for_any_number_of_threads_and_shards() {
         let experiment = experiment_of(&merged.plan).unwrap();
         assert_eq!(json(&*experiment, &merged), expected);
         assert_eq!(merged.cells[1].curves, whole.cells[1].curves);
-        assert_eq!(merged.metrics(), whole.metrics());
+        let numbers = |results: &Results| -> Vec<_> {
+            results.cells.iter().map(|cell| (cell.runs.clone(), cell.values.clone())).collect()
+        };
+        assert!(numbers(&merged) == numbers(&whole));
     }
 }
 

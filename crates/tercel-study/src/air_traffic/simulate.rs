@@ -32,7 +32,7 @@ impl Simulation {
     /// # Errors
     /// When the probability is none, or a file cannot be written.
     pub fn write(&self, folder: &Path, progress: &(dyn Fn() + Sync)) -> Result<(), StudyError> {
-        let failed = |source| StudyError::Folder { path: folder.to_path_buf(), source };
+        let failed = |source| StudyError::Output { path: folder.to_path_buf(), source };
         // A number that is no probability is found before anything is written.
         self.recording(0)?;
         std::fs::create_dir_all(folder).map_err(failed)?;

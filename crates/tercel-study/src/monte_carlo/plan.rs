@@ -99,6 +99,13 @@ impl Plan {
     }
 }
 
+impl Quantity {
+    /// Name and unit: `rmse_pos, m`.
+    pub fn heading(&self) -> String {
+        if self.unit.is_empty() { self.name.clone() } else { format!("{}, {}", self.name, self.unit) }
+    }
+}
+
 impl Shard {
     /// All runs.
     pub const WHOLE: Shard = Shard { index: 1, count: 1 };

@@ -58,7 +58,7 @@ impl Results {
             shard: self.shard,
             cells: self.cells.clone(),
         };
-        let failed = |source| StudyError::Folder { path: path.to_path_buf(), source };
+        let failed = |source| StudyError::Output { path: path.to_path_buf(), source };
         let json = serde_json::to_vec(&file).map_err(|error| failed(error.into()))?;
         let mut file = AtomicFile::create(path)?;
         file.write_all(&json).map_err(failed)?;
@@ -185,7 +185,8 @@ pub fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, StudyError> {
             found.push(path.clone());
             continue;
         }
-        let failed = |source| StudyError::Folder { path: path.clone(), source };
+        let failed =
+            |error| StudyError::Shard { path: path.clone(), problem: format!("cannot list: {error}") };
         let mut inside = Vec::new();
         for entry in std::fs::read_dir(path).map_err(failed)? {
             let entry = entry.map_err(failed)?;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use rayon::prelude::*;
 use tercel_data::table::{Metric, Metrics};
 
-use super::{Experiment, Results};
+use super::{Experiment, Quantity, Results};
 use crate::table::{Figure, Row, StudyTable};
 
 /// Name of the metric that counts failed runs.
@@ -111,9 +111,7 @@ impl Results {
             None => self.write_full(table, &mut text),
             Some(sweep) => {
                 for metric in plan.metrics.iter().filter(|metric| metric.shown) {
-                    let unit =
-                        if metric.unit.is_empty() { String::new() } else { format!(", {}", metric.unit) };
-                    let _ = writeln!(text, "\n{}{unit} (mean) over {}", metric.name, sweep.label);
+                    let _ = writeln!(text, "\n{} (mean) over {}", metric.heading(), sweep.label);
                     self.write_sweep(table, &metric.name, &sweep.values, &mut text);
                 }
                 text.push_str("\nDeviations and intervals are in the JSON form and in the report.\n");
@@ -126,15 +124,10 @@ impl Results {
     }
 
     fn write_full(&self, table: &StudyTable, text: &mut String) {
-        let shown: Vec<&str> = self
-            .plan
-            .metrics
-            .iter()
-            .filter(|metric| metric.shown)
-            .map(|metric| metric.name.as_str())
-            .collect();
+        let metrics = || self.plan.metrics.iter().filter(|metric| metric.shown);
+        let shown: Vec<&str> = metrics().map(|metric| metric.name.as_str()).collect();
         let mut lines = vec![vec!["method".to_owned()]];
-        lines[0].extend(shown.iter().map(|name| (*name).to_owned()));
+        lines[0].extend(metrics().map(Quantity::heading));
         lines[0].extend([FAILURES.to_owned(), "us per step".to_owned()]);
         for (row, cell) in table.rows.iter().zip(&self.cells) {
             let figures: Vec<Option<&Figure>> = shown.iter().map(|name| row.metrics.get(*name)).collect();

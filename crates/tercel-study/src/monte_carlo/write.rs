@@ -24,7 +24,7 @@ impl Results {
         table: &StudyTable,
         folder: &Path,
     ) -> Result<(), StudyError> {
-        let failed = |source| StudyError::Folder { path: folder.to_path_buf(), source };
+        let failed = |source| StudyError::Output { path: folder.to_path_buf(), source };
         std::fs::create_dir_all(folder).map_err(failed)?;
         let example = experiment.example()?;
         if let Some(example) = &example {
@@ -117,9 +117,8 @@ impl Results {
     fn figures(&self, table: &StudyTable, metric: &Quantity) -> Table {
         let mut columns = vec!["method".to_owned()];
         columns.extend(self.plan.sweep.as_ref().map(|sweep| sweep.name.clone()));
-        columns.extend(["mean", "std", "from", "to", "published", FAILURES].map(str::to_owned));
-        let unit = if metric.unit.is_empty() { String::new() } else { format!(", {}", metric.unit) };
-        let mut made = Table::new(format!("{}{unit}", metric.name), columns);
+        columns.extend(["mean", "std", "95 % from", "95 % to", "published", FAILURES].map(str::to_owned));
+        let mut made = Table::new(metric.heading(), columns);
         if self.plan.sweep.is_some() {
             made = made.folded();
         }
