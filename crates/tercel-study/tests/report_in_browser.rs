@@ -277,7 +277,7 @@ fn a_band_is_drawn_behind_its_curve_and_later_curves_are_dashed() {
     let count = |selector: &str| format!("document.querySelectorAll('.chart-plot {selector}').length");
     assert_eq!(browser.value(&count(".fills .js-fill")), json!(8));
     assert_eq!(browser.value(&count(".legendtext")), json!(8));
-    let dashed = "[...document.querySelectorAll('.chart-plot .js-line')].filter((line) => parseFloat(line.style.strokeDasharray) > 0)";
+    let dashed = "[...document.querySelectorAll('.chart-plot .scatterlayer .js-line')].filter((line) => parseFloat(line.style.strokeDasharray) > 0)";
     assert_eq!(browser.value(&format!("{dashed}.length")), json!(2));
     assert_eq!(browser.complaints(), [""; 0]);
 }

@@ -162,12 +162,12 @@ fn difference(first: &Results, second: &Results) -> Option<String> {
         options.iter().map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>().join(", ")
     };
     let pairs = [
-        ("study", a.study.clone(), b.study.clone()),
-        ("seed", a.seed.to_string(), b.seed.to_string()),
-        ("number of runs", a.runs.to_string(), b.runs.to_string()),
+        ("studies", a.study.clone(), b.study.clone()),
+        ("seeds", a.seed.to_string(), b.seed.to_string()),
+        ("numbers of runs", a.runs.to_string(), b.runs.to_string()),
         ("methods", a.methods.join(", "), b.methods.join(", ")),
         ("options", list(&a.options), list(&b.options)),
-        ("number of shards", first.shard.count().to_string(), second.shard.count().to_string()),
+        ("numbers of shards", first.shard.count().to_string(), second.shard.count().to_string()),
     ];
     let named = pairs.into_iter().find(|(_, a, b)| a != b);
     let named = named.map(|(what, a, b)| format!("their {what} differ: `{a}` and `{b}`"));

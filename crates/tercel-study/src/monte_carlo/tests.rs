@@ -160,18 +160,18 @@ fn shards_that_do_not_make_a_whole_are_refused_with_the_reason() {
     let twice = refusal(vec![shard("1/3"), shard("2/3"), shard("1/3")]);
     assert_eq!(twice, "file0 and file2 are both shard 1/3; each must be there once");
     let seeds = refusal(vec![shard("1/2"), results(&Dice::new(6, 20), "2/2", 1)]);
-    assert_eq!(seeds, "file0 and file1 cannot be joined: their seed differ: `5` and `6`");
+    assert_eq!(seeds, "file0 and file1 cannot be joined: their seeds differ: `5` and `6`");
     let changed = |change: &dyn Fn(&mut Plan)| {
         let mut other = shard("2/2");
         change(&mut other.plan);
         refusal(vec![shard("1/2"), other])
     };
-    assert!(changed(&|plan| plan.runs = 21).contains("number of runs differ: `20` and `21`"));
+    assert!(changed(&|plan| plan.runs = 21).contains("numbers of runs differ: `20` and `21`"));
     assert!(changed(&|plan| plan.study = "cards".to_owned()).contains("`dice` and `cards`"));
     assert!(changed(&|plan| plan.methods.reverse()).contains("methods differ"));
     assert!(changed(&|plan| drop(plan.options.insert("set".into(), "b".into()))).contains("options"));
     assert!(changed(&|plan| plan.curves[0].root = false).contains("curves"));
-    assert!(refusal(vec![shard("1/2"), shard("2/3")]).contains("number of shards"));
+    assert!(refusal(vec![shard("1/2"), shard("2/3")]).contains("numbers of shards"));
 }
 
 #[test]
