@@ -1,11 +1,11 @@
 //! One flight, drawn with what every method made of it.
 
-use tercel_data::table::Tracks;
+use tercel_data::table::{Detections, Observation, Tracks};
 
 use super::{Recording, StepEstimate, tables};
 use crate::StudyError;
 use crate::monte_carlo::Example;
-use crate::report::{Chart, Form, Picture, SensorNote};
+use crate::report::{Chart, Form, Picture};
 
 /// Draws a flight: the plan with one track per method, errors over time, and the manoeuvres that each method tells.
 pub(super) fn draw(
@@ -29,8 +29,7 @@ pub(super) fn draw(
         }));
         tracks.push(((*name).to_owned(), table));
     }
-    let sensor = SensorNote { sensor: tables::SENSOR.to_owned(), ..SensorNote::default() };
-    let mut picture = Picture::new(&detections, &all, Some(&truths), &[sensor])?;
+    let mut picture = Picture::new(&without_radar(&detections), &all, Some(&truths), &[])?;
     for (number, (name, _)) in (1..).zip(followed) {
         picture = picture.with_track_name(number, *name);
     }
@@ -38,6 +37,21 @@ pub(super) fn draw(
         picture = picture.with_chart(chart);
     }
     Ok(Example { title, picture, detections, truths, tracks })
+}
+
+/// The plots as positions. The radar is so far away that a plan with it would hardly show the flight.
+fn without_radar(detections: &Detections) -> Detections {
+    let mut plots = detections.clone();
+    for scan in &mut plots.scans {
+        scan.position = None;
+        for detection in &mut scan.detections {
+            if let Observation::Polar { range: Some(range), bearing, .. } = detection.observation {
+                let (sine, cosine) = bearing.sin_cos();
+                detection.observation = Observation::Position { x: range * cosine, y: range * sine, z: None };
+            }
+        }
+    }
+    plots
 }
 
 /// The upper triangle of the positions, out of that of the whole state.

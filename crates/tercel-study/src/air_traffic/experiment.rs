@@ -158,10 +158,10 @@ impl Experiment for AirTrafficExperiment {
     fn run(&self, condition: usize, run: u64) -> Vec<Attempt> {
         let recording = self.recording(condition, run);
         let steps = recording.plots.len() as u64;
-        let attempt = |method: &Box<dyn Method>| {
+        let attempt = |method: &dyn Method| {
             Attempt::of(steps, || method.follow(&recording), |estimates| score(&recording, &estimates))
         };
-        self.methods.iter().map(attempt).collect()
+        self.methods.iter().map(|method| attempt(&**method)).collect()
     }
 
     fn published(&self, method: &str, _condition: usize) -> Option<BTreeMap<String, f64>> {

@@ -54,10 +54,10 @@ impl Results {
             plan.options.iter().map(|(name, value)| format!(", {name} {value}")).collect();
         let mut report = Report::new(format!("Study {}{}", plan.study, options.concat()))
             .with_subtitle(format!(
-                "Seed {}, {} runs under each of {} conditions. Intervals hold the mean with 95 % (bootstrap).",
+                "Seed {}, {} runs{}. Intervals hold the mean with 95 % (bootstrap).",
                 plan.seed,
                 plan.runs,
-                plan.conditions()
+                if plan.sweep.is_some() { " under each condition" } else { "" }
             ))
             .with(self.summary(table));
         let failures = self.failures();
