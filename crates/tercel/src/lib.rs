@@ -46,6 +46,8 @@ pub use tercel_data as data;
 #[doc(inline)]
 pub use tercel_pipeline as pipeline;
 #[doc(inline)]
+pub use tercel_sim as sim;
+#[doc(inline)]
 pub use tercel_study as study;
 
 /// What most trackers are written with.
