@@ -3,6 +3,8 @@
 //! All on one core, except where threads are named. For comparison, on the machine where the figures in the documentation were taken: the LSTM step takes
 //! PyTorch 0.31 to 0.42 s, and that of KalmanNet #2 1.01 s.
 
+#![allow(clippy::unwrap_used)]
+
 use divan::Bencher;
 use tercel_train::backend::Tensor;
 use tercel_train::backend::constant;

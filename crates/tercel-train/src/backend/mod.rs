@@ -19,12 +19,12 @@ pub use operation::{Forward, Matrix, Operation, Past, apply};
 /// A matrix with a row for each member of the batch, differentiable or not.
 pub type Tensor = burn::tensor::Tensor<2>;
 
-/// The device that gradients are recorded on.
+/// The device of all tensors.
 pub fn device() -> Device {
-    Device::flex().autodiff()
+    Device::flex()
 }
 
-/// A constant: values in row-major order, of which no gradient is taken.
+/// A constant: values in row-major order, of which no gradient is taken. Operations on constants alone are not recorded.
 ///
 /// # Panics
 ///
@@ -35,7 +35,12 @@ pub fn constant(values: Vec<f32>, shape: [usize; 2]) -> Tensor {
 
 /// A leaf: a constant whose gradient [`Tape::gradient`] gives after the backward pass.
 pub fn leaf(values: Vec<f32>, shape: [usize; 2]) -> Tensor {
-    constant(values, shape).require_grad()
+    constant(values, shape).autodiff().require_grad()
+}
+
+/// The same values as a constant: no gradient flows back from here.
+pub fn detached(tensor: Tensor) -> Tensor {
+    tensor.without_autodiff()
 }
 
 /// The values of a tensor, in row-major order.

@@ -7,7 +7,7 @@ use burn::backend::autodiff::checkpoint::strategy::NoCheckpointing;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::flex::{FlexTensor, Layout};
-use burn::backend::{Autodiff, DType, Flex, TensorMetadata};
+use burn::backend::{Autodiff, Backend, DType, DispatchKindConversion, DispatchTensor, Flex, TensorMetadata};
 use burn::tensor::{Bytes, Shape};
 
 use super::Tensor;
@@ -92,14 +92,16 @@ pub trait Operation<const N: usize>: Debug + Clone + Send + 'static {
 ///
 /// If a tensor does not live on [`device`](super::device), which is where this crate makes all of them.
 pub fn apply<const N: usize, O: Operation<N>>(operation: O, inputs: [Tensor; N]) -> Tensor {
-    let inputs = inputs.map(|input| match input.try_into_primitive::<Autodiff<Flex>>() {
-        Ok(primitive) => primitive,
-        Err(error) => unreachable!("a tensor of another device: {error:?}"),
-    });
+    if !inputs.iter().any(Tensor::is_autodiff) {
+        let matrices = inputs.map(|input| Matrix::new(&primitive::<Flex>(input)));
+        let Forward { values, shape, .. } = operation.forward(&matrices);
+        return Tensor::from_primitive::<Flex>(tensor(values, shape));
+    }
+    let inputs = inputs.map(|input| primitive::<Autodiff<Flex>>(input.autodiff()));
     let matrices = inputs.each_ref().map(|input| Matrix::new(input.primitive()));
     let Forward { values, shape, saved } = operation.forward(&matrices);
     let value = tensor(values, shape);
-    let step = Step(operation.clone());
+    let step = Step(operation);
     let nodes = inputs.each_ref().map(|input| input.node());
     let value = match step.prepare::<NoCheckpointing>(nodes).compute_bound().stateful() {
         OpsKind::Tracked(prepared) => {
@@ -109,6 +111,16 @@ pub fn apply<const N: usize, O: Operation<N>>(operation: O, inputs: [Tensor; N])
         OpsKind::UnTracked(prepared) => prepared.finish(value),
     };
     Tensor::from_primitive::<Autodiff<Flex>>(value)
+}
+
+fn primitive<B: Backend>(tensor: Tensor) -> B::FloatTensorPrimitive
+where
+    DispatchTensor: DispatchKindConversion<B>,
+{
+    match tensor.try_into_primitive::<B>() {
+        Ok(primitive) => primitive,
+        Err(error) => unreachable!("a tensor of another device: {error:?}"),
+    }
 }
 
 fn tensor(values: Vec<f32>, shape: [usize; 2]) -> FlexTensor {

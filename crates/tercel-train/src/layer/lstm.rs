@@ -3,7 +3,7 @@
 use super::positive;
 use crate::backend::product::{add_product, add_product_transposed, add_transposed_product};
 use crate::backend::vector::{dispatch, repeat_row, sigmoid, sum_rows, tanh};
-use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply, constant};
+use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply, constant, detached};
 use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 
 /// A layer of long short-term memory.
@@ -49,7 +49,7 @@ impl LstmState {
 
     /// The same values, from which no gradient flows back: truncates back-propagation through time.
     pub fn detached(self) -> Self {
-        Self { hidden: self.hidden.detach(), cell: self.cell.detach() }
+        Self { hidden: detached(self.hidden), cell: detached(self.cell) }
     }
 }
 

@@ -9,7 +9,7 @@ use tercel_neural::filter::{Feature, KalmanNetHyper};
 use super::network::Network;
 use super::operations::{Correction, Features, Hold};
 use crate::Weights;
-use crate::backend::{Tensor, apply, constant};
+use crate::backend::{Tensor, apply, constant, detached};
 use crate::task::flights::Rollout;
 
 /// A batch of filters between two steps.
@@ -47,11 +47,11 @@ impl State {
     /// The same values, from which no gradient flows back.
     pub(super) fn detached(self) -> Self {
         Self {
-            estimate: self.estimate.detach(),
-            moved: self.moved.detach(),
-            corrected: self.corrected.detach(),
-            reading: self.reading.detach(),
-            memory: self.memory.into_iter().map(Tensor::detach).collect(),
+            estimate: detached(self.estimate),
+            moved: detached(self.moved),
+            corrected: detached(self.corrected),
+            reading: detached(self.reading),
+            memory: self.memory.into_iter().map(detached).collect(),
         }
     }
 }

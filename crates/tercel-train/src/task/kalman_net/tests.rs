@@ -312,3 +312,17 @@ fn recipes_that_make_no_sense_are_refused_by_key() {
     assert!(refused("[]", PAPER, ONE, "[data]").contains("features"));
     assert!(refused(ALL, PAPER, &ONE.replace("9", "0"), "[data]").contains("hidden"));
 }
+
+#[test]
+fn the_recipes_of_the_repository_can_be_trained() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes");
+    let mut found = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
+        if crate::recipe::kind(&text).unwrap() == KalmanNetKind::NAME {
+            KalmanNetTask::new(&Recipe::parse(&text).unwrap()).unwrap();
+            found += 1;
+        }
+    }
+    assert!(found >= 2);
+}
