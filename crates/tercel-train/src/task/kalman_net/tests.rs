@@ -249,7 +249,8 @@ fn a_training_from_a_recipe_improves_the_filter_and_the_run_time_opens_it() {
         ALL,
         OURS,
         TWO,
-        "[data]\ntraining = 8\nvalidation = 4\n[schedule]\nepochs = 3\nbatch = 4\n[optimiser]\nrate = 3e-3\n[loss]\nwindow = 50\n",
+        "[data]\ntraining = 4\nvalidation = 4\n[schedule]\nepochs = 3\nbatch = 4\nshards = 1\nupdate = \"window\"\n\
+         [optimiser]\nrate = 3e-3\n[loss]\nwindow = 100\n",
     );
     let run = Run { threads: 1, ..Run::new(folder.path().join("net.safetensors")) };
     let summary = crate::task::train(recipe.text(), &run, &mut |_| ControlFlow::Continue(())).unwrap();
