@@ -157,7 +157,7 @@ impl AdamW {
             let group = config.group.iter().find(|group| name.starts_with(&group.prefix));
             let rate = rate * group.map_or(1.0, |group| group.rate_factor);
             let decay = group.and_then(|group| group.weight_decay).unwrap_or(config.weight_decay);
-            Update {
+            let update = Update {
                 shrink: shrink as f32,
                 beta1: config.beta1 as f32,
                 beta2: config.beta2 as f32,
@@ -165,8 +165,11 @@ impl AdamW {
                 length: (rate / first_correction) as f32,
                 root: (1.0 / second_correction.sqrt()) as f32,
                 epsilon: config.epsilon as f32,
-            }
-            .apply(values, gradient, first, second);
+            };
+            dispatch(
+                Update::apply,
+                (update, values, gradient.as_slice(), first.as_mut_slice(), second.as_mut_slice()),
+            );
         }
         Some(norm)
     }
@@ -183,19 +186,22 @@ struct Update {
 }
 
 impl Update {
-    fn apply(&self, values: &mut [f32], gradient: &[f32], first: &mut [f32], second: &mut [f32]) {
-        dispatch(|| {
-            let moments = first.iter_mut().zip(second);
-            for ((value, gradient), (first, second)) in values.iter_mut().zip(gradient).zip(moments) {
-                let gradient = gradient * self.shrink;
-                *first = self.beta1 * *first + (1.0 - self.beta1) * gradient;
-                *second = self.beta2 * *second + (1.0 - self.beta2) * gradient * gradient;
-                *value =
-                    *value * self.keep - self.length * *first / (second.sqrt() * self.root + self.epsilon);
-            }
-        });
+    /// Changes values and moments.
+    #[inline(always)]
+    fn apply((update, values, gradient, first, second): Change<'_>) {
+        let moments = first.iter_mut().zip(second);
+        for ((value, gradient), (first, second)) in values.iter_mut().zip(gradient).zip(moments) {
+            let gradient = gradient * update.shrink;
+            *first = update.beta1 * *first + (1.0 - update.beta1) * gradient;
+            *second = update.beta2 * *second + (1.0 - update.beta2) * gradient * gradient;
+            let root = second.sqrt() * update.root + update.epsilon;
+            *value = *value * update.keep - update.length * *first / root;
+        }
     }
 }
+
+/// An update, and what it is applied to: values, gradients and both moments.
+type Change<'a> = (Update, &'a mut [f32], &'a [f32], &'a mut [f32], &'a mut [f32]);
 
 /// The Euclidean norm of all gradients together.
 pub fn norm(gradients: &[Vec<f32>]) -> f64 {

@@ -1,8 +1,9 @@
 //! Matrix products on slices in row-major order.
 //!
 //! `nalgebra` wraps the kernels of `matrixmultiply`, which choose their instructions at run time, behind views that check
-//! their bounds. It sends products with a dimension of five or fewer to a plain loop over strided columns, which is slow for
-//! rows in memory, so such products have loops of our own.
+//! their bounds. A matrix in rows is its transpose in columns, so the transposed product is computed, with a result in the
+//! layout that `nalgebra` expects: for products with a dimension of five or fewer, its own loops write past the end of a
+//! result that is laid out otherwise (0.35). Those loops are slow for rows in memory too, so such products have loops here.
 
 use nalgebra::{Dyn, MatrixView, MatrixViewMut};
 
@@ -14,73 +15,85 @@ type ViewMut<'a> = MatrixViewMut<'a, f32, Dyn, Dyn, Dyn, Dyn>;
 /// Largest dimension that goes to the loops of this module.
 const NARROW: usize = 5;
 
-fn rows_of(values: &[f32], rows: usize, columns: usize) -> View<'_> {
-    View::from_slice_with_strides_generic(values, Dyn(rows), Dyn(columns), Dyn(columns), Dyn(1))
-}
-
-fn columns_of(values: &[f32], rows: usize, columns: usize) -> View<'_> {
+/// The transpose of a matrix in rows.
+fn transposed(values: &[f32], rows: usize, columns: usize) -> View<'_> {
     View::from_slice_with_strides_generic(values, Dyn(columns), Dyn(rows), Dyn(1), Dyn(columns))
 }
 
-fn into_rows(values: &mut [f32], rows: usize, columns: usize) -> ViewMut<'_> {
-    ViewMut::from_slice_with_strides_generic(values, Dyn(rows), Dyn(columns), Dyn(columns), Dyn(1))
+/// A matrix in rows.
+fn plain(values: &[f32], rows: usize, columns: usize) -> View<'_> {
+    View::from_slice_with_strides_generic(values, Dyn(rows), Dyn(columns), Dyn(columns), Dyn(1))
+}
+
+/// Adds the product of two transposes to a result in rows of `m x n`: `(a b)^T = b^T a^T`.
+fn add_transposes(out: &mut [f32], b: &View<'_>, a: &View<'_>, [m, n]: [usize; 2]) {
+    let mut out = ViewMut::from_slice_with_strides_generic(out, Dyn(n), Dyn(m), Dyn(1), Dyn(n));
+    out.gemm(1.0, b, a, 1.0);
 }
 
 /// Adds `a b` to `out`, with `a` of `m x k` and `b` of `k x n`.
 pub fn add_product(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3]) {
     if m.min(k).min(n) > NARROW {
-        into_rows(out, m, n).gemm(1.0, &rows_of(a, m, k), &rows_of(b, k, n), 1.0);
-        return;
+        add_transposes(out, &transposed(b, k, n), &transposed(a, m, k), [m, n]);
+    } else if n <= NARROW {
+        let columns = transpose(b, k, n);
+        dispatch(add_dots, (out, a, columns.as_slice(), [k, n]));
+    } else {
+        dispatch(add_scaled_rows, (out, a, b, [k, n]));
     }
-    if n <= NARROW {
-        let transposed = transpose(b, k, n);
-        return add_dots(out, a, &transposed, [m, k, n]);
-    }
-    dispatch(|| {
-        for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
-            for (&factor, b) in a.iter().zip(b.chunks_exact(n)) {
-                add_scaled(out, factor, b);
-            }
-        }
-    });
 }
 
 /// Adds `a b^T` to `out`, with `a` of `m x k` and `b` of `n x k`: the gradient of the left factor of a product.
 pub fn add_product_transposed(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3]) {
     if m.min(k).min(n) > NARROW {
-        into_rows(out, m, n).gemm(1.0, &rows_of(a, m, k), &columns_of(b, n, k), 1.0);
+        add_transposes(out, &plain(b, n, k), &transposed(a, m, k), [m, n]);
     } else if n <= NARROW {
-        add_dots(out, a, b, [m, k, n]);
+        dispatch(add_dots, (out, a, b, [k, n]));
     } else {
-        let transposed = transpose(b, n, k);
-        add_product(out, a, &transposed, [m, k, n]);
+        let rows = transpose(b, n, k);
+        add_product(out, a, &rows, [m, k, n]);
     }
 }
 
 /// Adds `a^T b` to `out`, with `a` of `k x m` and `b` of `k x n`: the gradient of the right factor of a product.
 pub fn add_transposed_product(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3]) {
     if m.min(k).min(n) > NARROW {
-        into_rows(out, m, n).gemm(1.0, &columns_of(a, k, m), &rows_of(b, k, n), 1.0);
-        return;
-    }
-    if n < m {
+        add_transposes(out, &transposed(b, k, n), &plain(a, k, m), [m, n]);
+    } else if n < m {
         // The wider of the two is that along which the inner loop runs.
-        let mut transposed = vec![0.0; n * m];
-        add_transposed_product(&mut transposed, b, a, [n, k, m]);
+        let mut turned = vec![0.0; n * m];
+        dispatch(add_outer_products, (turned.as_mut_slice(), b, a, [n, m]));
         for (row, out) in out.chunks_exact_mut(n).enumerate() {
             for (column, out) in out.iter_mut().enumerate() {
-                *out += transposed[column * m + row];
+                *out += turned[column * m + row];
             }
         }
-        return;
+    } else {
+        dispatch(add_outer_products, (out, a, b, [m, n]));
     }
-    dispatch(|| {
-        for (a, b) in a.chunks_exact(m).zip(b.chunks_exact(n)) {
-            for (&factor, out) in a.iter().zip(out.chunks_exact_mut(n)) {
-                add_scaled(out, factor, b);
-            }
+}
+
+/// The result, two factors, and two dimensions.
+type Factors<'a> = (&'a mut [f32], &'a [f32], &'a [f32], [usize; 2]);
+
+/// Adds to each row the rows of `b`, scaled by that of `a`.
+#[inline(always)]
+fn add_scaled_rows((out, a, b, [k, n]): Factors<'_>) {
+    for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
+        for (&factor, b) in a.iter().zip(b.chunks_exact(n)) {
+            add_scaled(out, factor, b);
         }
-    });
+    }
+}
+
+/// Adds the outer products of the rows of `a` with those of `b`.
+#[inline(always)]
+fn add_outer_products((out, a, b, [m, n]): Factors<'_>) {
+    for (a, b) in a.chunks_exact(m).zip(b.chunks_exact(n)) {
+        for (&factor, out) in a.iter().zip(out.chunks_exact_mut(n)) {
+            add_scaled(out, factor, b);
+        }
+    }
 }
 
 #[inline(always)]
@@ -90,15 +103,14 @@ fn add_scaled(out: &mut [f32], factor: f32, values: &[f32]) {
     }
 }
 
-/// Adds the products of the rows of `a` with those of `b` to `out`.
-fn add_dots(out: &mut [f32], a: &[f32], b: &[f32], [_, k, n]: [usize; 3]) {
-    dispatch(|| {
-        for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
-            for (out, b) in out.iter_mut().zip(b.chunks_exact(k)) {
-                *out += dot(a, b);
-            }
+/// Adds the inner products of the rows of `a` with those of `b`.
+#[inline(always)]
+fn add_dots((out, a, b, [k, n]): Factors<'_>) {
+    for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
+        for (out, b) in out.iter_mut().zip(b.chunks_exact(k)) {
+            *out += dot(a, b);
         }
-    });
+    }
 }
 
 #[inline(always)]

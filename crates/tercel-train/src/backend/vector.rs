@@ -3,12 +3,25 @@
 //! The functions are plain loops that the compiler turns into vector instructions; `pulp` chooses at run time between the
 //! versions for different machines. Products and sums are not contracted, so that every machine gives the same numbers.
 
-use pulp::Arch;
+use pulp::{Arch, NullaryFnOnce};
 
-/// Runs a loop in the version for this machine.
-#[inline(always)]
-pub fn dispatch<R>(pass: impl FnOnce() -> R) -> R {
-    Arch::new().dispatch(pass)
+/// Runs a kernel in the version for this machine.
+///
+/// The kernel must be a function with `#[inline(always)]`, and so must be what it calls: what is not inlined is compiled for
+/// the oldest machine. A closure cannot promise that.
+pub fn dispatch<A, R>(kernel: impl FnOnce(A) -> R, arguments: A) -> R {
+    Arch::new().dispatch(Call(kernel, arguments))
+}
+
+struct Call<K, A>(K, A);
+
+impl<A, R, K: FnOnce(A) -> R> NullaryFnOnce for Call<K, A> {
+    type Output = R;
+
+    #[inline(always)]
+    fn call(self) -> R {
+        (self.0)(self.1)
+    }
 }
 
 /// `exp(x)` to about 1e-7 relative, for x held within +-87: 2^n times a polynomial in the remainder.
@@ -48,15 +61,28 @@ pub fn tanh(x: f32) -> f32 {
 
 /// Sums the rows of a matrix: the gradient of a bias.
 pub fn sum_rows(values: &[f32], columns: usize) -> Vec<f32> {
-    dispatch(|| {
-        let mut sums = vec![0.0; columns];
-        for row in values.chunks_exact(columns) {
-            for (sum, value) in sums.iter_mut().zip(row) {
-                *sum += value;
-            }
-        }
-        sums
-    })
+    let mut sums = vec![0.0; columns];
+    dispatch(sum_rows_kernel, (sums.as_mut_slice(), values));
+    sums
+}
+
+#[inline(always)]
+fn sum_rows_kernel((sums, values): (&mut [f32], &[f32])) {
+    for row in values.chunks_exact(sums.len()) {
+        add_kernel((sums, row));
+    }
+}
+
+/// Adds numbers to others.
+pub fn add(out: &mut [f32], values: &[f32]) {
+    dispatch(add_kernel, (out, values));
+}
+
+#[inline(always)]
+fn add_kernel((out, values): (&mut [f32], &[f32])) {
+    for (out, value) in out.iter_mut().zip(values) {
+        *out += value;
+    }
 }
 
 /// Copies a row into each row of a matrix: a bias, before products are added to it.

@@ -2,7 +2,7 @@
 
 use super::positive;
 use crate::backend::product::{add_product, add_product_transposed, add_transposed_product};
-use crate::backend::vector::{dispatch, repeat_row, sigmoid, sum_rows, tanh};
+use crate::backend::vector::{add, dispatch, repeat_row, sigmoid, sum_rows, tanh};
 use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply, constant};
 use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 
@@ -130,7 +130,8 @@ impl Operation<6> for Sequence {
             }
             add_product(&mut recurrent, before, hidden.values(), [sizes.batch, size, 3 * size]);
             let gates = &mut gates[3 * here.start..3 * here.end];
-            advance(gates, &recurrent, before, (&mut candidates[here], &mut rest[..state]), size);
+            let out = (&mut candidates[here], &mut rest[..state]);
+            dispatch(advance, (gates, &recurrent, before, out, size));
         }
         Forward { values: outputs, shape: [sizes.rows(), size], saved: Saved { gates, candidates } }
     }
@@ -148,9 +149,11 @@ impl Operation<6> for Sequence {
         for step in (0..sizes.steps).rev() {
             let here = step * state..(step + 1) * state;
             let wide = 3 * here.start..3 * here.end;
-            dispatch(|| of_memory.iter_mut().zip(&gradient[here.clone()]).for_each(|(sum, g)| *sum += g));
-            let known = (&before_all[here.clone()], &candidates[here]);
-            retreat(&mut gates[wide.clone()], known, &mut of_memory, &mut of_recurrent[wide.clone()], size);
+            add(&mut of_memory, &gradient[here.clone()]);
+            let (before, candidates) = (&before_all[here.clone()], &candidates[here]);
+            let changed = (of_memory.as_mut_slice(), &mut of_recurrent[wide.clone()]);
+            let gates = &mut gates[wide.clone()];
+            dispatch(retreat, (gates, before, candidates, changed.0, changed.1, size));
             let sizes = [sizes.batch, 3 * size, size];
             add_product_transposed(&mut of_memory, &of_recurrent[wide], hidden.values(), sizes);
         }
@@ -175,62 +178,62 @@ impl Operation<6> for Sequence {
     }
 }
 
+/// Gates, `(hr, hz, hn)`, the memory before the step, and to be filled: `hn` and outputs; then the number of units.
+type Advance<'a> = (&'a mut [f32], &'a [f32], &'a [f32], (&'a mut [f32], &'a mut [f32]), usize);
+
 /// One step of the batch: turns what the input contributes to the gates into `r`, `z`, `n`, and fills `hn` and outputs.
-fn advance(gates: &mut [f32], recurrent: &[f32], before: &[f32], out: (&mut [f32], &mut [f32]), size: usize) {
-    let (candidates, outputs) = out;
-    dispatch(|| {
-        let rows = gates.chunks_exact_mut(3 * size).zip(recurrent.chunks_exact(3 * size));
-        let states = before
-            .chunks_exact(size)
-            .zip(candidates.chunks_exact_mut(size).zip(outputs.chunks_exact_mut(size)));
-        for ((gates, recurrent), (before, (candidate, output))) in rows.zip(states) {
-            let (gated, n) = gates.split_at_mut(2 * size);
-            let (of_gates, of_candidate) = recurrent.split_at(2 * size);
-            gated.iter_mut().zip(of_gates).for_each(|(gate, h)| *gate = sigmoid(*gate + h));
-            candidate.copy_from_slice(of_candidate);
-            let (r, z) = gated.split_at(size);
-            n.iter_mut().zip(r.iter().zip(&*candidate)).for_each(|(n, (r, h))| *n = tanh(*n + r * h));
-            let (z, n, before, output) = (&z[..size], &n[..size], &before[..size], &mut output[..size]);
-            for k in 0..size {
-                output[k] = n[k] + z[k] * (before[k] - n[k]);
-            }
+#[inline(always)]
+fn advance((gates, recurrent, before, (candidates, outputs), size): Advance<'_>) {
+    let rows = gates.chunks_exact_mut(3 * size).zip(recurrent.chunks_exact(3 * size));
+    let out = candidates.chunks_exact_mut(size).zip(outputs.chunks_exact_mut(size));
+    for (((gates, recurrent), before), (candidate, output)) in rows.zip(before.chunks_exact(size)).zip(out) {
+        let (gated, n) = gates.split_at_mut(2 * size);
+        let (of_gates, of_candidate) = recurrent.split_at(2 * size);
+        for (gate, h) in gated.iter_mut().zip(of_gates) {
+            *gate = sigmoid(*gate + h);
         }
-    });
+        candidate.copy_from_slice(of_candidate);
+        let (r, z) = gated.split_at(size);
+        let (r, z, n, candidate) = (&r[..size], &z[..size], &mut n[..size], &candidate[..size]);
+        for k in 0..size {
+            n[k] = tanh(n[k] + r[k] * candidate[k]);
+        }
+        let (before, output) = (&before[..size], &mut output[..size]);
+        for k in 0..size {
+            output[k] = n[k] + z[k] * (before[k] - n[k]);
+        }
+    }
 }
+
+/// Gates, the memory before the step, `hn`, and to be changed: the gradients of the memory and of `(hr, hz, hn)`; then the
+/// number of units.
+type Retreat<'a> = (&'a mut [f32], &'a [f32], &'a [f32], &'a mut [f32], &'a mut [f32], usize);
 
 /// One step of the batch backwards: turns gates into the gradients of `xr`, `xz`, `xn`, fills those of `hr`, `hz`, `hn`,
 /// and leaves in `of_memory` what flows to the memory before the step past the product with `U`.
-fn retreat(
-    gates: &mut [f32],
-    (before, candidates): (&[f32], &[f32]),
-    of_memory: &mut [f32],
-    of_recurrent: &mut [f32],
-    size: usize,
-) {
-    dispatch(|| {
-        let known = before.chunks_exact(size).zip(candidates.chunks_exact(size));
-        let found = of_memory.chunks_exact_mut(size).zip(of_recurrent.chunks_exact_mut(3 * size));
-        for ((gates, (before, candidate)), (of_memory, of_recurrent)) in
-            gates.chunks_exact_mut(3 * size).zip(known).zip(found)
-        {
-            let (r, rest) = gates.split_at_mut(size);
-            let (z, n) = rest.split_at_mut(size);
-            let (r, z, n) = (&mut r[..size], &mut z[..size], &mut n[..size]);
-            let (before, candidate, of_memory) =
-                (&before[..size], &candidate[..size], &mut of_memory[..size]);
-            for k in 0..size {
-                let (gate, value, slope) = (z[k], n[k], of_memory[k]);
-                n[k] = slope * (1.0 - gate) * (1.0 - value * value);
-                z[k] = slope * (before[k] - value) * gate * (1.0 - gate);
-                of_memory[k] = slope * gate;
-            }
-            let of_candidate = &mut of_recurrent[2 * size..];
-            for k in 0..size {
-                let gate = r[k];
-                of_candidate[k] = n[k] * gate;
-                r[k] = n[k] * candidate[k] * gate * (1.0 - gate);
-            }
-            of_recurrent[..2 * size].copy_from_slice(&gates[..2 * size]);
+#[inline(always)]
+fn retreat((gates, before, candidates, of_memory, of_recurrent, size): Retreat<'_>) {
+    let known = before.chunks_exact(size).zip(candidates.chunks_exact(size));
+    let found = of_memory.chunks_exact_mut(size).zip(of_recurrent.chunks_exact_mut(3 * size));
+    for ((gates, (before, candidate)), (of_memory, of_recurrent)) in
+        gates.chunks_exact_mut(3 * size).zip(known).zip(found)
+    {
+        let (r, rest) = gates.split_at_mut(size);
+        let (z, n) = rest.split_at_mut(size);
+        let (r, z, n) = (&mut r[..size], &mut z[..size], &mut n[..size]);
+        let (before, candidate, of_memory) = (&before[..size], &candidate[..size], &mut of_memory[..size]);
+        for k in 0..size {
+            let (gate, value, slope) = (z[k], n[k], of_memory[k]);
+            n[k] = slope * (1.0 - gate) * (1.0 - value * value);
+            z[k] = slope * (before[k] - value) * gate * (1.0 - gate);
+            of_memory[k] = slope * gate;
         }
-    });
+        let of_candidate = &mut of_recurrent[2 * size..][..size];
+        for k in 0..size {
+            let gate = r[k];
+            of_candidate[k] = n[k] * gate;
+            r[k] = n[k] * candidate[k] * gate * (1.0 - gate);
+        }
+        of_recurrent[..2 * size].copy_from_slice(&gates[..2 * size]);
+    }
 }

@@ -25,28 +25,67 @@ pub enum Activation {
 
 impl Activation {
     fn apply(self, values: &mut [f32]) {
-        dispatch(|| match self {
+        match self {
             Self::Identity => {}
-            // Not `max`, which would turn what is not a number into zero and hide it.
-            Self::Relu => values.iter_mut().for_each(|x| *x = if *x < 0.0 { 0.0 } else { *x }),
-            Self::Tanh => values.iter_mut().for_each(|x| *x = tanh(*x)),
-            Self::Sigmoid => values.iter_mut().for_each(|x| *x = sigmoid(*x)),
-        });
+            Self::Relu => dispatch(relu, values),
+            Self::Tanh => dispatch(all_tanh, values),
+            Self::Sigmoid => dispatch(all_sigmoid, values),
+        }
     }
 
     /// Turns the gradient with respect to the output into that with respect to what the activation was applied to.
     fn backward(self, value: &[f32], gradient: &[f32]) -> Vec<f32> {
-        let each = |slope: fn(f32) -> f32| {
-            dispatch(|| value.iter().zip(gradient).map(|(y, g)| g * slope(*y)).collect())
-        };
+        let mut inner = gradient.to_vec();
         match self {
-            Self::Identity => gradient.to_vec(),
-            Self::Relu => dispatch(|| {
-                value.iter().zip(gradient).map(|(y, g)| if *y > 0.0 { *g } else { 0.0 }).collect()
-            }),
-            Self::Tanh => each(|y| 1.0 - y * y),
-            Self::Sigmoid => each(|y| y * (1.0 - y)),
+            Self::Identity => {}
+            Self::Relu => dispatch(relu_slope, (inner.as_mut_slice(), value)),
+            Self::Tanh => dispatch(tanh_slope, (inner.as_mut_slice(), value)),
+            Self::Sigmoid => dispatch(sigmoid_slope, (inner.as_mut_slice(), value)),
         }
+        inner
+    }
+}
+
+#[inline(always)]
+fn relu(values: &mut [f32]) {
+    for x in values {
+        // Not `max`, which would turn what is not a number into zero and hide it.
+        *x = if *x < 0.0 { 0.0 } else { *x };
+    }
+}
+
+#[inline(always)]
+fn all_tanh(values: &mut [f32]) {
+    for x in values {
+        *x = tanh(*x);
+    }
+}
+
+#[inline(always)]
+fn all_sigmoid(values: &mut [f32]) {
+    for x in values {
+        *x = sigmoid(*x);
+    }
+}
+
+#[inline(always)]
+fn relu_slope((gradient, value): (&mut [f32], &[f32])) {
+    for (g, y) in gradient.iter_mut().zip(value) {
+        *g = if *y > 0.0 { *g } else { 0.0 };
+    }
+}
+
+#[inline(always)]
+fn tanh_slope((gradient, value): (&mut [f32], &[f32])) {
+    for (g, y) in gradient.iter_mut().zip(value) {
+        *g *= 1.0 - y * y;
+    }
+}
+
+#[inline(always)]
+fn sigmoid_slope((gradient, value): (&mut [f32], &[f32])) {
+    for (g, y) in gradient.iter_mut().zip(value) {
+        *g *= y * (1.0 - y);
     }
 }
 

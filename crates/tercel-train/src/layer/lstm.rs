@@ -2,7 +2,7 @@
 
 use super::positive;
 use crate::backend::product::{add_product, add_product_transposed, add_transposed_product};
-use crate::backend::vector::{dispatch, repeat_row, sigmoid, sum_rows, tanh};
+use crate::backend::vector::{add, dispatch, repeat_row, sigmoid, sum_rows, tanh};
 use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply, constant, detached};
 use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 
@@ -185,7 +185,7 @@ impl Operation<6> for Sequence {
             let gates = &mut gates[4 * here.start..4 * here.end];
             add_product(gates, last, hidden.values(), [sizes.batch, size, 4 * size]);
             let rows = (&mut cells[here.clone()], &mut bent[here.clone()], &mut outputs[here.clone()]);
-            advance(gates, &previous, rows, size);
+            dispatch(advance, (gates, previous.as_slice(), rows, size));
             previous.copy_from_slice(&cells[here]);
         }
         let mut rows = sizes.rows();
@@ -216,7 +216,7 @@ impl Operation<6> for Sequence {
             before_all[here.clone()].copy_from_slice(last);
             add(&mut of_hidden, &gradient[here.clone()]);
             let gates = &mut gates[4 * here.start..4 * here.end];
-            retreat(gates, (cell, &bent[here]), &of_hidden, &mut of_cell, size);
+            dispatch(retreat, (&mut *gates, cell, &bent[here], &of_hidden, of_cell.as_mut_slice(), size));
             of_hidden.fill(0.0);
             add_product_transposed(&mut of_hidden, gates, hidden.values(), [sizes.batch, 4 * size, size]);
         }
@@ -241,72 +241,77 @@ impl Operation<6> for Sequence {
     }
 }
 
-fn add(out: &mut [f32], values: &[f32]) {
-    dispatch(|| out.iter_mut().zip(values).for_each(|(out, value)| *out += value));
-}
+/// Gates, cells before the step, and to be filled: cells, their tangents, outputs; then the number of units.
+type Advance<'a> = (&'a mut [f32], &'a [f32], (&'a mut [f32], &'a mut [f32], &'a mut [f32]), usize);
 
 /// One step of the batch: activates the gates in place and fills cells, their tangents and outputs.
-fn advance(gates: &mut [f32], previous: &[f32], out: (&mut [f32], &mut [f32], &mut [f32]), size: usize) {
-    let (cells, bent, outputs) = out;
-    dispatch(|| {
-        let rows = gates.chunks_exact_mut(4 * size).zip(previous.chunks_exact(size));
-        let out =
-            cells.chunks_exact_mut(size).zip(bent.chunks_exact_mut(size)).zip(outputs.chunks_exact_mut(size));
-        for ((gates, previous), ((cell, bent), output)) in rows.zip(out) {
-            // Separate passes: one loop over all slices is not vectorised.
-            gates[..2 * size].iter_mut().for_each(|gate| *gate = sigmoid(*gate));
-            gates[2 * size..3 * size].iter_mut().for_each(|gate| *gate = tanh(*gate));
-            gates[3 * size..].iter_mut().for_each(|gate| *gate = sigmoid(*gate));
-            let (i, rest) = gates.split_at(size);
-            let (f, rest) = rest.split_at(size);
-            let (g, o) = rest.split_at(size);
-            let (previous, cell) = (&previous[..size], &mut cell[..size]);
-            for k in 0..size {
-                cell[k] = f[k] * previous[k] + i[k] * g[k];
-            }
-            bent.iter_mut().zip(&*cell).for_each(|(bent, cell)| *bent = tanh(*cell));
-            output.iter_mut().zip(o.iter().zip(&*bent)).for_each(|(output, (o, bent))| *output = o * bent);
+#[inline(always)]
+fn advance((gates, previous, (cells, bent, outputs), size): Advance<'_>) {
+    let rows = gates.chunks_exact_mut(4 * size).zip(previous.chunks_exact(size));
+    let out =
+        cells.chunks_exact_mut(size).zip(bent.chunks_exact_mut(size)).zip(outputs.chunks_exact_mut(size));
+    for ((gates, previous), ((cell, bent), output)) in rows.zip(out) {
+        // Separate passes: one loop over all slices is not vectorised.
+        let (i, rest) = gates.split_at_mut(size);
+        let (f, rest) = rest.split_at_mut(size);
+        let (g, o) = rest.split_at_mut(size);
+        for gate in i.iter_mut().chain(&mut *f) {
+            *gate = sigmoid(*gate);
         }
-    });
+        for gate in &mut *g {
+            *gate = tanh(*gate);
+        }
+        for gate in &mut *o {
+            *gate = sigmoid(*gate);
+        }
+        let (i, f, g, o) = (&i[..size], &f[..size], &g[..size], &o[..size]);
+        let (previous, cell, bent, output) =
+            (&previous[..size], &mut cell[..size], &mut bent[..size], &mut output[..size]);
+        for k in 0..size {
+            cell[k] = f[k] * previous[k] + i[k] * g[k];
+        }
+        for k in 0..size {
+            bent[k] = tanh(cell[k]);
+        }
+        for k in 0..size {
+            output[k] = o[k] * bent[k];
+        }
+    }
 }
+
+/// Gates, cells before the step, tangents of those after it, gradients of outputs and cells, and the number of units.
+type Retreat<'a> = (&'a mut [f32], &'a [f32], &'a [f32], &'a [f32], &'a mut [f32], usize);
 
 /// One step of the batch backwards: turns gates into the gradients of what was in them before their activations, and the
 /// gradient of the cells after the step into that of the cells before it.
-fn retreat(
-    gates: &mut [f32],
-    (previous, bent): (&[f32], &[f32]),
-    of_hidden: &[f32],
-    of_cell: &mut [f32],
-    size: usize,
-) {
-    dispatch(|| {
-        let known = previous.chunks_exact(size).zip(bent.chunks_exact(size));
-        let given = of_hidden.chunks_exact(size).zip(of_cell.chunks_exact_mut(size));
-        for ((gates, (previous, bent)), (of_hidden, of_cell)) in
-            gates.chunks_exact_mut(4 * size).zip(known).zip(given)
-        {
-            let (i, rest) = gates.split_at_mut(size);
-            let (f, rest) = rest.split_at_mut(size);
-            let (g, o) = rest.split_at_mut(size);
-            let (previous, bent) = (&previous[..size], &bent[..size]);
-            let (of_hidden, of_cell) = (&of_hidden[..size], &mut of_cell[..size]);
-            let (i, f, g, o) = (&mut i[..size], &mut f[..size], &mut g[..size], &mut o[..size]);
-            for k in 0..size {
-                of_cell[k] += of_hidden[k] * o[k] * (1.0 - bent[k] * bent[k]);
-            }
-            for k in 0..size {
-                o[k] = of_hidden[k] * bent[k] * o[k] * (1.0 - o[k]);
-            }
-            for k in 0..size {
-                let (gate, input) = (i[k], g[k]);
-                i[k] = of_cell[k] * input * gate * (1.0 - gate);
-                g[k] = of_cell[k] * gate * (1.0 - input * input);
-            }
-            for k in 0..size {
-                let gate = f[k];
-                f[k] = of_cell[k] * previous[k] * gate * (1.0 - gate);
-                of_cell[k] *= gate;
-            }
+#[inline(always)]
+fn retreat((gates, previous, bent, of_hidden, of_cell, size): Retreat<'_>) {
+    let known = previous.chunks_exact(size).zip(bent.chunks_exact(size));
+    let given = of_hidden.chunks_exact(size).zip(of_cell.chunks_exact_mut(size));
+    for ((gates, (previous, bent)), (of_hidden, of_cell)) in
+        gates.chunks_exact_mut(4 * size).zip(known).zip(given)
+    {
+        let (i, rest) = gates.split_at_mut(size);
+        let (f, rest) = rest.split_at_mut(size);
+        let (g, o) = rest.split_at_mut(size);
+        let (previous, bent) = (&previous[..size], &bent[..size]);
+        let (of_hidden, of_cell) = (&of_hidden[..size], &mut of_cell[..size]);
+        let (i, f, g, o) = (&mut i[..size], &mut f[..size], &mut g[..size], &mut o[..size]);
+        for k in 0..size {
+            of_cell[k] += of_hidden[k] * o[k] * (1.0 - bent[k] * bent[k]);
         }
-    });
+        for k in 0..size {
+            o[k] = of_hidden[k] * bent[k] * o[k] * (1.0 - o[k]);
+        }
+        for k in 0..size {
+            let (gate, input) = (i[k], g[k]);
+            i[k] = of_cell[k] * input * gate * (1.0 - gate);
+            g[k] = of_cell[k] * gate * (1.0 - input * input);
+        }
+        for k in 0..size {
+            let gate = f[k];
+            f[k] = of_cell[k] * previous[k] * gate * (1.0 - gate);
+            of_cell[k] *= gate;
+        }
+    }
 }
