@@ -246,7 +246,14 @@ pub fn run(
         scored.push((method.clone(), results?));
     }
     let rows = scored.iter().map(|(method, results)| row(method, results, seed)).collect();
-    let table = StudyTable { study: NAME.to_string(), seed, runs: recordings.len(), rows };
+    let table = StudyTable {
+        study: NAME.to_string(),
+        options: BTreeMap::new(),
+        version: env!("CARGO_PKG_VERSION").to_string(),
+        seed,
+        runs: recordings.len(),
+        rows,
+    };
     let metrics = metrics(&recordings, &scored);
     Ok(AutoferryResult { table, metrics, recordings, scored })
 }

@@ -21,7 +21,8 @@ pub struct EvaluateOptions {
     /// Times to look at, s; without them every time at which a track was reported while the truth is known. Give the times
     /// of all scans where scans without any track should count as missed.
     pub times: Option<Vec<f64>>,
-    /// Only false tracks within this distance of an object count in the metrics named `near`, m.
+    /// Only false tracks within this distance of an object count in the metrics named `near`, m. Tracks within the cut-off always
+    /// count.
     pub near: f64,
     /// Widest gap between rows of the truth that is bridged, s.
     pub truth_gap: f64,
@@ -130,7 +131,7 @@ pub fn evaluate(
     for &time in &times {
         let picture = Picture::new(time, &objects, &lines, options);
         let far = picture.nearest_object();
-        let within: Vec<[f64; 2]> = picture.tracks_within(options.near);
+        let within: Vec<[f64; 2]> = picture.tracks_within(options.near.max(options.cutoff));
         let score = gospa.score(&picture.objects, &picture.tracks)?;
         let (switches, covered) = holders.assign(&picture, options.cutoff);
         errors.take(&picture, options.cutoff);

@@ -45,7 +45,7 @@ pub struct MonteCarlo {
     pub runs: u64,
     /// The sets of scenes among which can be chosen, the default first; none when there is nothing to choose.
     pub sets: &'static [&'static str],
-    build: fn(&Request<'_>) -> Result<AirTrafficExperiment, StudyError>,
+    build: fn(&Request<'_>) -> Result<Box<dyn Experiment>, StudyError>,
 }
 
 /// What may be chosen about a study whose scenes are drawn; what is not chosen is as the study has it.
@@ -76,6 +76,12 @@ impl Request<'_> {
     }
 }
 
+fn boxed<E: Experiment + 'static>(
+    experiment: Result<E, StudyError>,
+) -> Result<Box<dyn Experiment>, StudyError> {
+    Ok(Box::new(experiment?))
+}
+
 /// All studies.
 pub const STUDIES: [Study; 5] = [
     Study {
@@ -86,7 +92,7 @@ pub const STUDIES: [Study; 5] = [
             seed: air_traffic::SEED,
             runs: 1000,
             sets: &[],
-            build: |r| AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods),
+            build: |r| boxed(AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods)),
         }),
     },
     Study {
@@ -97,7 +103,7 @@ pub const STUDIES: [Study; 5] = [
             seed: air_traffic::SEED,
             runs: 1000,
             sets: &[],
-            build: |r| AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods),
+            build: |r| boxed(AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods)),
         }),
     },
     Study {
@@ -108,7 +114,7 @@ pub const STUDIES: [Study; 5] = [
             seed: air_traffic::SEED,
             runs: 200,
             sets: &["test", "hshm"],
-            build: |r| AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods),
+            build: |r| boxed(AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods)),
         }),
     },
     Study {
@@ -119,7 +125,7 @@ pub const STUDIES: [Study; 5] = [
             seed: air_traffic::SEED,
             runs: 200,
             sets: &["test", "hshm"],
-            build: |r| AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods),
+            build: |r| boxed(AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods)),
         }),
     },
     Study {
@@ -189,7 +195,7 @@ impl Study {
         }
         let seed = choice.seed.unwrap_or(study.seed);
         let request = Request { set, seed, runs, methods: &methods };
-        Ok(Box::new((study.build)(&request)?))
+        (study.build)(&request)
     }
 }
 

@@ -11,6 +11,11 @@ use std::fmt::Write as _;
 pub struct StudyTable {
     /// Name of the study.
     pub study: String,
+    /// What was chosen beside seed, runs and methods, such as the set of scenes; left out when there is nothing to choose.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub options: BTreeMap<String, String>,
+    /// Version of the program that computed it.
+    pub version: String,
     /// Seed of its random numbers.
     pub seed: u64,
     /// Runs (or recordings) that each figure is taken over.
@@ -69,7 +74,11 @@ impl Figure {
         }
         let mean = values.iter().sum::<f64>() / count as f64;
         let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-        let std = if count > 1 { (squares / (count - 1) as f64).sqrt() } else { 0.0 };
+        if count == 1 {
+            // One run says nothing about the scatter.
+            return Figure { mean, std: f64::NAN, lo: f64::NAN, hi: f64::NAN };
+        }
+        let std = (squares / (count - 1) as f64).sqrt();
         if values.iter().all(|&value| value == values[0]) {
             return Figure { mean, std, lo: mean, hi: mean };
         }

@@ -20,7 +20,7 @@ use crate::progress::Progress;
 /// numbers are the same to the last bit for any number of threads; only the time for a step differs.
 ///
 /// A long study can be shared among machines: run it with --shard 1/4 to 4/4 and the same -o, and join the files with
-/// `tercel study merge`. A shard whose file is there is not computed again, so an interrupted study goes on where it was.
+/// `tercel study merge`. A shard whose file is there is not computed again, so an interrupted study goes on with the first shard that was not finished.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_long_help = AFTER)]
@@ -49,7 +49,7 @@ pub struct StudyArguments {
     #[arg(long, requires = "shard")]
     force: bool,
     /// Threads to use; without it, one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Folder with the recordings of a study on real data.
     #[arg(long, value_name = "DIR")]
@@ -133,6 +133,10 @@ impl StudyArguments {
         shard: Shard,
         console: &Console,
     ) -> Result<Results, Failure> {
+        // Hours of work should not end at a folder that cannot be written to.
+        if let Some(folder) = &self.output {
+            tercel_study::monte_carlo::probe(folder)?;
+        }
         let plan = experiment.plan();
         let progress = Progress::bar(console, "running", shard.runs(plan.runs).count() * plan.conditions());
         Ok(conduct(experiment, shard, self.threads.map(usize::from), &|| progress.step())?)
@@ -152,15 +156,14 @@ impl StudyArguments {
                 Failure::from(error).with_help("--force computes the shard again and replaces the file")
             })?;
             if there.plan != *plan {
-                let message = format!("{} holds other runs, methods or options", path.display());
+                let differs = there.plan.difference(plan).unwrap_or_default();
+                let message = format!("{} holds another shard: {differs}", path.display());
                 let help = "take another folder, or replace it with --force";
                 return Err(Failure::input(message).with_help(help));
             }
             console.note(format!("{} is there already and is kept", path.display()));
             return Ok(());
         }
-        std::fs::create_dir_all(folder)
-            .map_err(|error| Failure::failed(format!("{}: cannot create: {error}", folder.display())))?;
         let results = self.conduct(experiment, shard, console)?;
         results.write(&path)?;
         for line in results.failures() {
@@ -180,7 +183,7 @@ impl StudyArguments {
         ];
         if let Some((option, _)) = drawn.iter().find(|(_, given)| *given) {
             let message = format!(
-                "the study {} takes no {option}: it has recordings, and nothing is drawn",
+                "the study {} takes no {option}: it goes through all of its recordings, one after the other",
                 study.name
             );
             return Err(Failure::usage(message));
@@ -209,18 +212,21 @@ fn finish(
     console: &Console,
 ) -> Result<(), Failure> {
     let table = results.table(experiment);
+    // What was computed is shown first: a full disk should not take it away.
+    if json {
+        for line in results.failures() {
+            console.warn(line);
+        }
+        print_json(&table)?;
+    } else {
+        output::print(&results.text(&table))?;
+    }
     if let Some(folder) = folder {
         results.publish(experiment, &table, folder)?;
         let files = "study.json, metrics.csv, report.html and the tables of an example";
         console.note(format!("{files} are in {}", folder.display()));
     }
-    if json {
-        for line in results.failures() {
-            console.warn(line);
-        }
-        return print_json(&table);
-    }
-    output::print(&results.text(&table))
+    Ok(())
 }
 
 fn print_json(table: &StudyTable) -> Result<(), Failure> {

@@ -32,6 +32,7 @@ pub use plan::{Curve, Plan, Quantity, Shard, Sweep};
 pub use results::{Cell, Failure, Results};
 pub use runner::{Progress, conduct};
 pub use shard_file::find as find_shards;
+pub use write::probe;
 
 #[cfg(test)]
 mod tests;

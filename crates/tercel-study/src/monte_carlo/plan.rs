@@ -28,6 +28,25 @@ pub struct Plan {
     pub curves: Vec<Curve>,
 }
 
+impl Plan {
+    /// In what two plans differ, in words: the first such thing.
+    pub fn difference(&self, other: &Plan) -> Option<String> {
+        let list = |options: &BTreeMap<String, String>| {
+            options.iter().map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>().join(", ")
+        };
+        let pairs = [
+            ("studies", self.study.clone(), other.study.clone()),
+            ("seeds", self.seed.to_string(), other.seed.to_string()),
+            ("numbers of runs", self.runs.to_string(), other.runs.to_string()),
+            ("methods", self.methods.join(", "), other.methods.join(", ")),
+            ("options", list(&self.options), list(&other.options)),
+        ];
+        let named = pairs.into_iter().find(|(_, a, b)| a != b);
+        let named = named.map(|(what, a, b)| format!("their {what} differ: `{a}` and `{b}`"));
+        named.or_else(|| (self != other).then(|| "their conditions, metrics or curves differ".to_owned()))
+    }
+}
+
 /// A quantity that takes several values in a study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

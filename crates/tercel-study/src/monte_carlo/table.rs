@@ -21,6 +21,8 @@ impl Results {
             .collect();
         StudyTable {
             study: self.plan.study.clone(),
+            options: self.plan.options.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: self.plan.seed,
             runs: usize::try_from(self.plan.runs).unwrap_or(usize::MAX),
             rows,

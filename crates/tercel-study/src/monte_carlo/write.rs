@@ -11,10 +11,35 @@ use crate::StudyError;
 use crate::report::{Chart, Report, Summary, Table};
 use crate::table::{Figure, Row, StudyTable};
 
+/// Makes a folder for results, and tries whether files can be written to it: before the work, not after it.
+///
+/// # Errors
+/// When the folder cannot be made or written to.
+pub fn probe(folder: &Path) -> Result<(), StudyError> {
+    let failed = |source| StudyError::Output { path: folder.to_path_buf(), source };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    // Given up again at once.
+    AtomicFile::create(&folder.join("study.json"))?;
+    Ok(())
+}
+
+/// Takes away the example of an earlier study, whose methods may be others.
+fn remove_examples(folder: &Path) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with("example_") && name.ends_with(".csv") {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
 impl Results {
     /// Writes to `folder` the table (`study.json`), the numbers of every run (`metrics.csv`), a report (`report.html`), and the
-    /// run that it draws (`example_truth.csv`, `example_detections.csv`, `example_METHOD.csv`). Each file appears whole or not
-    /// at all, the report last.
+    /// run that it draws (`example_truth.csv`, `example_detections.csv`, `example_METHOD.csv`; those of an earlier study are
+    /// taken away). Each file appears whole or not at all, the report last.
     ///
     /// # Errors
     /// When a file cannot be written.
@@ -26,6 +51,7 @@ impl Results {
     ) -> Result<(), StudyError> {
         let failed = |source| StudyError::Output { path: folder.to_path_buf(), source };
         std::fs::create_dir_all(folder).map_err(failed)?;
+        remove_examples(folder).map_err(failed)?;
         let example = experiment.example()?;
         if let Some(example) = &example {
             tercel_data::write_truths(folder.join("example_truth.csv"), &example.truths)?;
