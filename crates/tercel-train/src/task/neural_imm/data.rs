@@ -1,5 +1,7 @@
 //! Flights as a bank of filters followed them: what the network sees, and what it should make of it.
 
+use std::sync::{Arc, OnceLock};
+
 use nalgebra::{Matrix2, Vector2, Vector4};
 use rand::RngExt;
 use serde::Deserialize;
@@ -18,8 +20,11 @@ use crate::trainer::{Draw, Split};
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BankDataConfig {
-    /// Training flights in an epoch. Each epoch has flights of its own.
+    /// Training flights in an epoch.
     pub training: usize,
+    /// Whether each epoch has flights of its own. Otherwise those of the first are kept, a megabyte for every six of 200 steps:
+    /// the bank takes longer to follow a flight than the network to learn from it.
+    pub fresh: bool,
     /// Validation flights.
     pub validation: usize,
     /// Steps of a flight, with the first.
@@ -42,6 +47,7 @@ impl Default for BankDataConfig {
     fn default() -> Self {
         Self {
             training: 12_800,
+            fresh: false,
             validation: 1_024,
             steps: 200,
             population: vec![Population::default()],
@@ -103,6 +109,8 @@ pub(super) struct BankData {
     stated: NeuralImm<RangeBearing>,
     estimating: NeuralImm<RangeBearing>,
     seed: u64,
+    /// Flights that were followed and are kept, of both splits.
+    kept: [Vec<OnceLock<Arc<Log>>>; 2],
 }
 
 /// Keeps the flights of trainings apart from those of studies, whose seeds are small numbers.
@@ -148,6 +156,7 @@ impl BankData {
             estimating: filter(&radars).map_err(fault)?,
             config: config.clone(),
             seed,
+            kept: [empty(if config.fresh { 0 } else { config.training }), empty(config.validation)],
         })
     }
 
@@ -161,23 +170,33 @@ impl BankData {
     /// The flights of a draw, followed by the bank.
     pub fn batch(&self, draw: Draw<'_>) -> Result<Followed, TrainError> {
         let hyper = self.stated.network().hyper();
-        let mut followed = Followed::new(draw.samples.len(), self.config.steps, hyper.inputs());
+        let mut followed = Followed::new(draw.samples.len(), self.config.steps, hyper.inputs(), &hyper.rates);
         for (member, sample) in draw.samples.iter().enumerate() {
-            self.follow(draw, *sample, member, &mut followed).map_err(|error| match error {
+            let log = self.log(draw, *sample).map_err(|error| match error {
                 TrainError::Data(reason) => TrainError::Data(format!("flight {sample}: {reason}")),
                 other => other,
             })?;
+            followed.add(member, &log);
         }
         Ok(followed)
     }
 
-    fn follow(
-        &self,
-        draw: Draw<'_>,
-        sample: u64,
-        member: usize,
-        followed: &mut Followed,
-    ) -> Result<(), TrainError> {
+    /// A flight, followed now or before.
+    fn log(&self, draw: Draw<'_>, sample: u64) -> Result<Arc<Log>, TrainError> {
+        let [training, validation] = &self.kept;
+        let kept = if draw.split == Split::Training { training } else { validation };
+        let Some(place) = usize::try_from(sample).ok().and_then(|sample| kept.get(sample)) else {
+            return Ok(Arc::new(self.follow(draw, sample)?));
+        };
+        if let Some(log) = place.get() {
+            return Ok(log.clone());
+        }
+        // Two threads that follow it at one time find the same.
+        let log = Arc::new(self.follow(Draw { epoch: 0, ..draw }, sample)?);
+        Ok(place.get_or_init(|| log).clone())
+    }
+
+    fn follow(&self, draw: Draw<'_>, sample: u64) -> Result<Log, TrainError> {
         let fault = |error: &dyn std::fmt::Display| TrainError::Data(error.to_string());
         let (seed, run) = match draw.split {
             Split::Training => (TRAINING, draw.epoch as u64 * self.config.training as u64 + sample),
@@ -197,20 +216,24 @@ impl BankData {
         let (first, rest) = plots.split_first().ok_or_else(|| fault(&"it has no steps"))?;
         let first = first.as_ref().ok_or_else(|| fault(&"its first step was not seen"))?;
         let mut belief = filter.birth(&measure(first)).map_err(|error| fault(&error))?;
-        let mut updates = 0;
+        let mut log = Log::default();
         for (step, plot) in rest.iter().enumerate() {
             filter.predict(&mut belief, flight.interval());
             if let Some(plot) = plot {
                 filter.update(&mut belief, &measure(plot)).map_err(|error| fault(&error))?;
-                followed.see(member, updates, belief.inputs());
-                updates += 1;
+                log.inputs.extend_from_slice(belief.inputs());
+                log.updates += 1;
             }
-            if step + 1 >= super::SKIP && updates > 0 {
-                followed.expect(member, updates - 1, &belief, &flight, step + 1, filter.bank().rates());
+            if step + 1 >= super::SKIP && log.updates > 0 {
+                log.expect(&belief, &flight, step + 1);
             }
         }
-        Ok(())
+        Ok(log)
     }
+}
+
+fn empty(count: usize) -> Vec<OnceLock<Arc<Log>>> {
+    (0..count).map(|_| OnceLock::new()).collect()
 }
 
 fn measurement(plot: &Vector2<f64>, radar: Option<&Radar>) -> Measurement<2> {
@@ -221,6 +244,37 @@ fn measurement(plot: &Vector2<f64>, radar: Option<&Radar>) -> Measurement<2> {
             let variances = Vector2::new(radar.range() * radar.range(), radar.bearing() * radar.bearing());
             measurement.with_noise(Matrix2::from_diagonal(&variances))
         }
+    }
+}
+
+/// What the bank said of one flight.
+#[derive(Debug, Default)]
+struct Log {
+    /// Inputs of the network, one row after the other.
+    inputs: Vec<f32>,
+    /// Measurements after the first.
+    updates: usize,
+    /// The instants that count; their rows are numbers of updates.
+    instants: Vec<Instant>,
+    ln_probabilities: Vec<f32>,
+    offsets: Vec<[f32; 4]>,
+}
+
+impl Log {
+    fn expect(&mut self, belief: &NeuralImmBelief, flight: &Flight, step: usize) {
+        let outlook = belief.outlook();
+        let four = |v: &Vector4<f64>| -> [f32; 4] { std::array::from_fn(|i| v[i] as f32) };
+        let target = outlook.turned(&(flight.states()[step] - outlook.state().mean));
+        let root = outlook.root();
+        self.instants.push(Instant {
+            member: 0,
+            row: self.updates - 1,
+            target: four(&target),
+            root: std::array::from_fn(|i| std::array::from_fn(|j| root[(i, j)] as f32)),
+            manoeuvre: flight.manoeuvres()[step].index() as u8,
+        });
+        self.ln_probabilities.extend(outlook.probabilities().iter().map(|p| p.ln() as f32));
+        self.offsets.extend(outlook.offsets().iter().map(four));
     }
 }
 
@@ -238,6 +292,7 @@ pub(super) struct Followed {
     /// For each instant, the turn rates one after the other.
     pub ln_probabilities: Vec<f32>,
     pub offsets: Vec<[f32; 4]>,
+    /// The manoeuvre of each turn rate.
     pub directions: Vec<u8>,
 }
 
@@ -256,8 +311,9 @@ pub(super) struct Instant {
 }
 
 impl Followed {
-    fn new(members: usize, steps: usize, width: usize) -> Self {
+    fn new(members: usize, steps: usize, width: usize, rates: &[f64]) -> Self {
         let updates = steps - 1;
+        let direction = |rate: &f64| if *rate == 0.0 { 0 } else { 1 + u8::from(*rate < 0.0) };
         Self {
             members,
             updates,
@@ -266,7 +322,7 @@ impl Followed {
             instants: Vec::with_capacity(members * updates),
             ln_probabilities: Vec::new(),
             offsets: Vec::new(),
-            directions: Vec::new(),
+            directions: rates.iter().map(direction).collect(),
         }
     }
 
@@ -275,36 +331,14 @@ impl Followed {
         self.width
     }
 
-    fn see(&mut self, member: usize, update: usize, inputs: &[f32]) {
-        let row = update * self.members + member;
-        self.inputs[row * self.width..][..self.width].copy_from_slice(inputs);
-    }
-
-    fn expect(
-        &mut self,
-        member: usize,
-        update: usize,
-        belief: &NeuralImmBelief,
-        flight: &Flight,
-        step: usize,
-        rates: &[f64],
-    ) {
-        let outlook = belief.outlook();
-        let four = |v: &Vector4<f64>| -> [f32; 4] { std::array::from_fn(|i| v[i] as f32) };
-        let target = outlook.turned(&(flight.states()[step] - outlook.state().mean));
-        let root = outlook.root();
-        self.instants.push(Instant {
-            member,
-            row: update * self.members + member,
-            target: four(&target),
-            root: std::array::from_fn(|i| std::array::from_fn(|j| root[(i, j)] as f32)),
-            manoeuvre: flight.manoeuvres()[step].index() as u8,
-        });
-        self.ln_probabilities.extend(outlook.probabilities().iter().map(|p| p.ln() as f32));
-        self.offsets.extend(outlook.offsets().iter().map(four));
-        if self.directions.is_empty() {
-            let direction = |rate: &f64| if *rate == 0.0 { 0 } else { 1 + u8::from(*rate < 0.0) };
-            self.directions = rates.iter().map(direction).collect();
+    fn add(&mut self, member: usize, log: &Log) {
+        let (members, width) = (self.members, self.width);
+        for (update, inputs) in log.inputs.chunks_exact(width).enumerate() {
+            self.inputs[(update * members + member) * width..][..width].copy_from_slice(inputs);
         }
+        let placed = |instant: &Instant| Instant { member, row: instant.row * members + member, ..*instant };
+        self.instants.extend(log.instants.iter().map(placed));
+        self.ln_probabilities.extend_from_slice(&log.ln_probabilities);
+        self.offsets.extend_from_slice(&log.offsets);
     }
 }
