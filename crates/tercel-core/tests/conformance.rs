@@ -99,7 +99,7 @@ conformance!(
 conformance!(
     imm_with_particles,
     positions::<4, _, _>(Expectations { consistent: None, ..Expectations::sampled() }, |p| {
-        Imm::new([1, 2].map(|seed| smoothed(p, 4000, seed)), Transition::sticky(0.9)).unwrap()
+        Imm::new([1, 2].map(|seed| smoothed(p, 2000, seed)), Transition::sticky(0.9)).unwrap()
     })
 );
 
