@@ -1,7 +1,7 @@
 //! Time of a training step: `cargo bench -p tercel-train --bench step`.
 //!
-//! All on one core, except where threads are named. For comparison, on the machine where the figures in the documentation were taken: the LSTM step takes
-//! PyTorch 0.31 to 0.42 s, and that of KalmanNet #2 1.01 s.
+//! All on one core, except where threads are named. For comparison, on the machine where the figures in the
+//! documentation were taken: the LSTM step takes PyTorch 0.31 to 0.42 s, and that of KalmanNet #2 1.01 s.
 
 #![allow(clippy::unwrap_used)]
 
@@ -106,7 +106,8 @@ mod kalman_net {
     }
 }
 
-/// 200 steps of a Kalman filter for 128 objects, forward and backward: prediction, gain, Joseph form, log-likelihood.
+/// 200 steps of a Kalman filter for 128 objects, forward and backward: prediction, gain, Joseph form,
+/// log-likelihood.
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn kalman_steps(bencher: Bencher) {
     use nalgebra::Matrix4;

@@ -13,7 +13,8 @@
 //! [schedule]               # ScheduleConfig
 //! ```
 //!
-//! A key that is not understood is an error that names it and its line, and values are checked before any training starts.
+//! A key that is not understood is an error that names it and its line, and values are checked before any
+//! training starts.
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -79,8 +80,8 @@ impl<K: Kind> Recipe<K> {
     ///
     /// # Errors
     ///
-    /// If it is not TOML, has a key that is not understood, lacks one, is of another kind or version, or a value is
-    /// impossible.
+    /// If it is not TOML, has a key that is not understood, lacks one, is of another kind or version, or a
+    /// value is impossible.
     pub fn parse(text: &str) -> Result<Self, TrainError> {
         let kind = kind(text)?;
         if kind != K::NAME {
@@ -95,7 +96,8 @@ impl<K: Kind> Recipe<K> {
         Ok(Self { text: text.to_owned(), ..recipe })
     }
 
-    /// The hash of the text, as 16 hexadecimal digits: tells whether a checkpoint or model belongs to the recipe.
+    /// The hash of the text, as 16 hexadecimal digits: tells whether a checkpoint or model belongs to the
+    /// recipe.
     pub fn hash(&self) -> String {
         format!("{:016x}", fnv1a(self.text.as_bytes()))
     }
@@ -143,8 +145,8 @@ pub struct ScheduleConfig {
     pub epochs: usize,
     /// Samples in a batch.
     pub batch: usize,
-    /// Parts into which a batch is split, each with a graph of its own. The result depends on it by rounding; it does
-    /// not depend on the number of threads, of which there is use for as many.
+    /// Parts into which a batch is split, each with a graph of its own. The result depends on it by rounding;
+    /// it does not depend on the number of threads, of which there is use for as many.
     pub shards: usize,
     /// When the parameters change.
     pub update: UpdateEach,

@@ -186,8 +186,8 @@ impl Flights {
     }
 }
 
-/// Flights side by side: what a batch of filters is given, and what it should say. Positions are relative to the first
-/// reading of each flight.
+/// Flights side by side: what a batch of filters is given, and what it should say. Positions are relative to
+/// the first reading of each flight.
 #[derive(Debug)]
 pub struct Rollout {
     /// The number of flights.

@@ -41,7 +41,8 @@ pub struct Draw<'a> {
 }
 
 impl Draw<'_> {
-    /// Random numbers for one sample, for what is drawn anew in each epoch: noise, missed measurements, dropout.
+    /// Random numbers for one sample, for what is drawn anew in each epoch: noise, missed measurements,
+    /// dropout.
     pub fn random(&self, sample: u64) -> ChaCha8Rng {
         let split = match self.split {
             Split::Training => 0x7261_696e,
@@ -66,15 +67,17 @@ pub struct Loss {
 
 /// A task: a model, its data and its loss.
 ///
-/// A task is a plain value that any number of threads read at a time. The crate's documentation has an example.
+/// A task is a plain value that any number of threads read at a time. The crate's documentation has an
+/// example.
 pub trait Task: Sync {
     /// The data of one shard of a batch.
     type Batch: Send;
-    /// What is carried from one window of truncated back-propagation to the next: detached states. `()` without windows.
+    /// What is carried from one window of truncated back-propagation to the next: detached states. `()`
+    /// without windows.
     type Memory: Send;
 
-    /// The card of the model as far as the task knows it: kind, state, sizes and options, scales. The trainer fills in the
-    /// rest.
+    /// The card of the model as far as the task knows it: kind, state, sizes and options, scales. The trainer
+    /// fills in the rest.
     fn card(&self) -> Card;
 
     /// The number of samples of a split.
@@ -94,8 +97,8 @@ pub trait Task: Sync {
 
     /// The loss of a window.
     ///
-    /// The memory is `None` in the first window. What is left in it is given to the next one, of the same batch; it must be
-    /// detached, or the gradient would reach into a graph that is gone.
+    /// The memory is `None` in the first window. What is left in it is given to the next one, of the same
+    /// batch; it must be detached, or the gradient would reach into a graph that is gone.
     ///
     /// # Errors
     ///
