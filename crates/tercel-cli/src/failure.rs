@@ -172,7 +172,12 @@ impl From<StudyError> for Failure {
         match error {
             StudyError::Data(error) => error.into(),
             StudyError::Report(error) => error.into(),
-            StudyError::Score(_) => Failure::Failed(Report::of(&error)),
+            StudyError::Score(_) | StudyError::Threads(_) | StudyError::Output { .. } => {
+                Failure::Failed(Report::of(&error))
+            }
+            StudyError::Unknown { .. } | StudyError::UnknownMethod { .. } | StudyError::Option(_) => {
+                Failure::Usage(Report::of(&error))
+            }
             _ => Failure::Input(Report::of(&error)),
         }
     }

@@ -6,7 +6,7 @@ mod support;
 
 use support::{files, fixtures, run};
 
-const COMMANDS: [&[&str]; 11] = [
+const COMMANDS: [&[&str]; 14] = [
     &[],
     &["track"],
     &["evaluate"],
@@ -16,7 +16,10 @@ const COMMANDS: [&[&str]; 11] = [
     &["config", "check"],
     &["config", "schema"],
     &["config", "presets"],
+    &["simulate"],
     &["study"],
+    &["study", "merge"],
+    &["study", "list"],
     &["completions"],
 ];
 

@@ -4,7 +4,9 @@
 
 use allocation_counter::measure;
 use tercel_core::belief::Gaussian;
-use tercel_core::filter::{Extended, Filter, Imm, Kalman, Padded, Particle, Transition, Unscented};
+use tercel_core::filter::{
+    Extended, Filter, Imm, Kalman, Padded, Particle, RandomTurns, RaoBlackwellised, Transition, Unscented,
+};
 use tercel_core::motion::{ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Turn};
 use tercel_core::sensor::{Measurement, Position, RangeBearing};
 
@@ -61,6 +63,11 @@ fn interacting_models_do_not_allocate() {
         let imm = Imm::new(modes, transition).unwrap();
         assert_eq!(allocations::<4, _>(&imm, [100.0, 50.0]), 0);
     }
+    // With parts in continuous time, the matrix is computed anew at every step.
+    let noise = Transition::sticky(1.0);
+    let joint = Transition::joint([(Transition::sticky(0.9).per(3.0), 3), (noise, 2)]);
+    let grid = modes.into_iter().flat_map(|mode| [mode, mode]);
+    assert_eq!(allocations::<4, _>(&Imm::new(grid, joint).unwrap(), [100.0, 50.0]), 0);
     type Boxed = Box<dyn Filter<6, Belief = Gaussian<6>, Measurement = Measurement<2>>>;
     let boxes: [Boxed; 2] = [
         Box::new(Padded::<_, 4>::new(Kalman::new(ConstantVelocity::new(0.5), radar()), 2.0).unwrap()),
@@ -78,4 +85,11 @@ fn particles_do_not_allocate_even_when_they_are_resampled() {
     let modes = [1, 2].map(|seed| Particle::new(straight, radar(), 200, seed).unwrap());
     let imm = Imm::new(modes, Transition::sticky(0.9)).unwrap();
     assert_eq!(allocations::<4, _>(&imm, [100.0, 50.0]), 0);
+}
+
+#[test]
+fn rao_blackwellised_particles_do_not_allocate_even_when_they_are_resampled() {
+    let turns = RandomTurns::new(0.05, 0.2, 0.5..=5.0).unwrap();
+    let filter = RaoBlackwellised::new(turns, radar(), 200, 1).unwrap().with_threshold(1.0).unwrap();
+    assert_eq!(allocations::<4, _>(&filter, [100.0, 50.0]), 0);
 }

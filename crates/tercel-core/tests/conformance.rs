@@ -4,12 +4,14 @@
 
 #[path = "conformance/polar.rs"]
 mod polar;
+#[path = "conformance/regimes.rs"]
+mod regimes;
 
 use tercel_core::belief::Gaussian;
 use tercel_core::conformance;
 use tercel_core::conformance::{Expectations, Problem, positions};
 use tercel_core::filter::{
-    Extended, Filter, Imm, Kalman, Padded, Particle, SigmaPoints, Transition, Unscented,
+    Extended, Filter, Imm, Kalman, Padded, Particle, RaoBlackwellised, SigmaPoints, Transition, Unscented,
 };
 use tercel_core::motion::{ConstantAcceleration, ConstantVelocity, Turn};
 use tercel_core::sensor::{Measurement, Position};
@@ -98,6 +100,31 @@ conformance!(
     imm_with_particles,
     positions::<4, _, _>(Expectations { consistent: None, ..Expectations::sampled() }, |p| {
         Imm::new([1, 2].map(|seed| smoothed(p, 4000, seed)), Transition::sticky(0.9)).unwrap()
+    })
+);
+
+conformance!(
+    rao_blackwellised_filter_of_one_mode,
+    positions::<4, _, _>(Expectations::exact(), |p| {
+        RaoBlackwellised::new(regimes::Equal::of(p, 1), p.sensor(), 2, 1).unwrap()
+    })
+);
+conformance!(
+    rao_blackwellised_filter_of_equal_modes,
+    positions::<4, _, _>(Expectations { extremes: false, ..Expectations::exact() }, |p| {
+        RaoBlackwellised::new(regimes::Equal::of(p, 3), p.sensor(), 6, 1).unwrap()
+    })
+);
+conformance!(
+    rao_blackwellised_filter_of_levels,
+    positions::<4, _, _>(Expectations::sampled(), |p| {
+        RaoBlackwellised::new(regimes::Levels::of(p), p.sensor(), 20, 1).unwrap()
+    })
+);
+conformance!(
+    rao_blackwellised_filter_of_turns,
+    positions::<4, _, _>(Expectations { moments: Some(1e-6), ..Expectations::own_models() }, |p| {
+        RaoBlackwellised::new(regimes::turns(p), p.sensor(), 5, 1).unwrap()
     })
 );
 

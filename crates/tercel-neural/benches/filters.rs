@@ -1,1 +1,49 @@
-fn main() {}
+//! Time of one step (predict and update) of each learned filter: `cargo bench -p tercel-neural --bench filters`.
+
+#![allow(clippy::unwrap_used)]
+
+#[path = "../tests/untrained/mod.rs"]
+mod untrained;
+
+use divan::{Bencher, black_box};
+use tercel_core::filter::Filter;
+use tercel_core::motion::ConstantVelocity;
+use tercel_core::sensor::{ConvertedPolar, Measurement};
+use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper};
+use untrained::{network, tiny};
+
+fn main() {
+    divan::main();
+}
+
+/// Steps timed together, so that the clock does not count.
+const STEPS: u32 = 100;
+
+fn steps(bencher: Bencher, hyper: &KalmanNetHyper) {
+    let radar = ConvertedPolar::new(50.0, 0.005).unwrap();
+    let filter = KalmanNet::new(network(hyper, 0.1), ConstantVelocity::new(1.0), radar);
+    let seen: Measurement<2> = [10_000.0, 0.5].into();
+    let mut belief = filter.birth(&seen).unwrap();
+    bencher.counter(divan::counter::ItemsCount::new(STEPS)).bench_local(|| {
+        for _ in 0..STEPS {
+            filter.predict(black_box(&mut belief), black_box(1.0));
+            black_box(filter.update(&mut belief, black_box(&seen))).unwrap();
+        }
+    });
+}
+
+#[divan::bench]
+fn kalman_net_one(bencher: Bencher) {
+    steps(bencher, &KalmanNetHyper::paper(Architecture::one()));
+}
+
+#[divan::bench]
+fn kalman_net_two(bencher: Bencher) {
+    steps(bencher, &KalmanNetHyper::paper(Architecture::two()));
+}
+
+/// With magnitudes, in the frame of the sensor, with Joseph's covariance.
+#[divan::bench]
+fn kalman_net_two_with_all_options(bencher: Bencher) {
+    steps(bencher, &tiny(Architecture::two(), Covariance::Joseph));
+}

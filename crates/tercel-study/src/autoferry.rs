@@ -268,7 +268,7 @@ fn row(method: &str, results: &[Scored], seed: u64) -> Row {
     let seconds: f64 = results.iter().map(|result| result.seconds).sum();
     let scans: u64 = results.iter().map(|result| result.scans).sum();
     let us_per_step = 1e6 * seconds / scans.max(1) as f64;
-    Row { method: method.to_string(), metrics, us_per_step, published: published(method) }
+    Row { method: method.to_string(), at: None, metrics, us_per_step, published: published(method) }
 }
 
 /// The best figures of Stone Soup 1.9.1's trackers on the same recordings, tuned on them: a JPDA with the radar's lag in its

@@ -37,6 +37,14 @@ pub enum StudyError {
         /// Why.
         source: std::io::Error,
     },
+    /// Results could not be written.
+    #[error("cannot write to {}: {source}", path.display())]
+    Output {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A folder holds no recordings of the expected format.
     #[error("{} holds no recording named {expected}", path.display())]
     NoRecordings {
@@ -51,6 +59,56 @@ pub enum StudyError {
         /// The recording.
         recording: String,
     },
+    /// A number or name that a study cannot use.
+    #[error("{0}")]
+    Option(String),
+    /// The threads of a study could not be started.
+    #[error("cannot start the threads of the study: {0}")]
+    Threads(String),
+    /// A file is no shard, or one that cannot be used.
+    #[error("{}: {problem}", path.display())]
+    Shard {
+        /// The file, or a folder without any.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// There is nothing to merge.
+    #[error(
+        "there are no shards to merge\n  help: name the files that `tercel study NAME --shard 1/4 -o DIR` wrote, or DIR"
+    )]
+    NoShards,
+    /// Two shards do not belong to the same study.
+    #[error("{} and {} cannot be joined: {difference}", first.display(), second.display())]
+    DifferentShards {
+        /// A file.
+        first: PathBuf,
+        /// Another file.
+        second: PathBuf,
+        /// In what they differ.
+        difference: String,
+    },
+    /// A shard is there twice.
+    #[error("{} and {} are both shard {shard}; each must be there once", first.display(), second.display())]
+    ShardTwice {
+        /// A file.
+        first: PathBuf,
+        /// Another file.
+        second: PathBuf,
+        /// The shard that they both are.
+        shard: String,
+    },
+    /// Shards are missing.
+    #[error("the study {study} is not complete: shard {missing} is missing")]
+    MissingShards {
+        /// The study.
+        study: String,
+        /// The missing shards.
+        missing: String,
+    },
+    /// A scenario cannot be simulated.
+    #[error(transparent)]
+    Simulation(#[from] tercel_sim::SimulationError),
     /// A table could not be read or written.
     #[error(transparent)]
     Data(#[from] DataError),

@@ -4,13 +4,19 @@
 //! |---|---|
 //! | [`evaluate`] | scores tracks against the truth |
 //! | [`report`] | draws a recording, its tracks and scores as one HTML file |
+//! | [`studies`] | the studies by name |
+//! | [`monte_carlo`] | carries out studies whose scenes are drawn, on all cores or several machines |
+//! | [`air_traffic`] | the studies of one manoeuvring aircraft |
 //! | [`autoferry`] | the study on real radar and lidar |
 //! | [`tune`] | fits the numbers of a configuration to recordings |
 
+pub mod air_traffic;
 pub mod autoferry;
 mod error;
 pub mod evaluate;
+pub mod monte_carlo;
 pub mod report;
+pub mod studies;
 mod table;
 mod timeline;
 pub mod tune;

@@ -24,6 +24,9 @@ pub struct StudyTable {
 pub struct Row {
     /// Its name.
     pub method: String,
+    /// Under which condition, by the name of what a study changes from row to row.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<BTreeMap<String, f64>>,
     /// Its figures by the name of the metric.
     pub metrics: BTreeMap<String, Figure>,
     /// Time for one step (a scan), microseconds.
@@ -67,6 +70,9 @@ impl Figure {
         let mean = values.iter().sum::<f64>() / count as f64;
         let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
         let std = if count > 1 { (squares / (count - 1) as f64).sqrt() } else { 0.0 };
+        if values.iter().all(|&value| value == values[0]) {
+            return Figure { mean, std, lo: mean, hi: mean };
+        }
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut draw =
             || (0..count).map(|_| values[random.random_range(0..count)]).sum::<f64>() / count as f64;

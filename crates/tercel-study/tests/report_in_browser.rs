@@ -13,7 +13,9 @@ mod scene;
 use browser::Browser;
 use serde_json::json;
 use tercel_data::table::{Detections, Tracks};
+use tercel_study::monte_carlo::{Shard, conduct};
 use tercel_study::report::{Picture, Report};
+use tercel_study::studies::{Choice, Study};
 
 /// Functions that the tests call in the page. `painted` is a number that changes with the marks of the plan; `ink`
 /// counts the pixels that have any.
@@ -233,6 +235,50 @@ fn names_from_the_data_stay_text() {
     assert_eq!(browser.value("document.querySelectorAll('img').length"), json!(0));
     let legend = "[...document.querySelectorAll('.legendtext')].map((text) => text.textContent)";
     assert_eq!(browser.value(&format!("{legend}.includes('<b>%{{x}}</b>')")), json!(true));
+    assert_eq!(browser.complaints(), [""; 0]);
+}
+
+#[test]
+fn a_study_shows_its_tables_its_curves_and_an_example_with_a_track_for_each_method() {
+    let study = Study::find("atc-test").unwrap();
+    let methods = Some(["measurement", "oracle"].map(str::to_owned).to_vec());
+    let experiment = study.experiment(&Choice { methods, runs: Some(3), ..Choice::default() }).unwrap();
+    let results = conduct(&*experiment, Shard::WHOLE, None, &|| {}).unwrap();
+    let example = experiment.example().unwrap();
+    let report = results.report(&*experiment, &results.table(&*experiment), example);
+    let Some(mut browser) = browse(&report) else { return };
+    let names = "[...document.querySelectorAll('.tracks tbody th')].map((cell) => cell.textContent)";
+    assert_eq!(browser.value(names), json!(["measurement", "oracle"]));
+    // One table for each metric that is shown, and the published one.
+    assert_eq!(browser.value("document.querySelectorAll('details.figures').length"), json!(7));
+    let first =
+        "[...document.querySelectorAll('.figures tbody')].map((body) => body.rows[0].cells[0].textContent)";
+    assert_eq!(
+        browser.value(first),
+        json!(["oracle", "measurement", "oracle", "measurement", "oracle", "oracle", "imm-paper"])
+    );
+    // Position and velocity over time; distance, true and told manoeuvres, and the number of tracks below the plan.
+    assert_eq!(browser.value("document.querySelectorAll('.chart-figure').length"), json!(6));
+    assert!(number(&mut browser, "ink()") > 500.0);
+    assert_eq!(browser.complaints(), [""; 0]);
+}
+
+#[test]
+fn a_band_is_drawn_behind_its_curve_and_later_curves_are_dashed() {
+    let x: Vec<f64> = (0..5).map(f64::from).collect();
+    let shifted = |by: f64| x.iter().map(|x| x + by).collect::<Vec<_>>();
+    let start = tercel_study::report::Chart::over("Errors", "m", "Noise, m", x.clone());
+    let chart = (0..8).fold(start, |chart, part| {
+        let level = f64::from(part);
+        let (low, high) = (shifted(level - 0.4), shifted(level + 0.4));
+        chart.with_banded_part(format!("method {part}"), shifted(level), low, high)
+    });
+    let Some(mut browser) = browse(&Report::new("Bands").with(chart)) else { return };
+    let count = |selector: &str| format!("document.querySelectorAll('.chart-plot {selector}').length");
+    assert_eq!(browser.value(&count(".fills .js-fill")), json!(8));
+    assert_eq!(browser.value(&count(".legendtext")), json!(8));
+    let dashed = "[...document.querySelectorAll('.chart-plot .scatterlayer .js-line')].filter((line) => parseFloat(line.style.strokeDasharray) > 0)";
+    assert_eq!(browser.value(&format!("{dashed}.length")), json!(2));
     assert_eq!(browser.complaints(), [""; 0]);
 }
 

@@ -27,7 +27,8 @@
 //!
 //! Each choice may be another one, and nothing else changes:
 //!
-//! - **the motion**: a bank of [`Turn`](motion::Turn)s in an [`Imm`](filter::Imm) follows aircraft that manoeuvre;
+//! - **the motion**: a [`TurnBank`](filter::TurnBank) follows aircraft that manoeuvre, any filters in an [`Imm`](filter::Imm)
+//!   whatever else changes its motion, and the learned filters of [`neural`] what models do not say;
 //! - **the sensor**: [`RangeBearing`](sensor::RangeBearing) with an [`Extended`](filter::Extended) or an
 //!   [`Unscented`](filter::Unscented) filter, [`ConvertedPolar`](sensor::ConvertedPolar) with a [`Kalman`](filter::Kalman) filter;
 //!   the filter goes in with each scan, so sensors may move and several may feed one tracker;
@@ -44,7 +45,11 @@ pub use tercel_core::{association, belief, error, filter, geo, metric, motion, m
 #[doc(inline)]
 pub use tercel_data as data;
 #[doc(inline)]
+pub use tercel_neural as neural;
+#[doc(inline)]
 pub use tercel_pipeline as pipeline;
+#[doc(inline)]
+pub use tercel_sim as sim;
 #[doc(inline)]
 pub use tercel_study as study;
 
@@ -53,8 +58,8 @@ pub mod prelude {
     pub use tercel_core::belief::Gaussian;
     pub use tercel_core::error::FilterError;
     pub use tercel_core::filter::{
-        Estimate, Extended, Filter, Imm, ImmBelief, Innovation, Kalman, Padded, Particle, Transition,
-        Unscented,
+        Estimate, Extended, Filter, Imm, ImmBelief, Innovation, Kalman, Padded, Particle, RaoBlackwellised,
+        Transition, TurnBank, Unscented,
     };
     pub use tercel_core::metric::{Gospa, Ospa, TrajectoryGospa};
     pub use tercel_core::motion::{

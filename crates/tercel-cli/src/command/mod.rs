@@ -4,6 +4,7 @@ mod completions;
 mod config;
 mod convert;
 mod evaluate;
+mod simulate;
 mod study;
 mod track;
 
@@ -20,6 +21,7 @@ pub enum Command {
     Convert(convert::ConvertArguments),
     #[command(subcommand)]
     Config(config::ConfigCommand),
+    Simulate(simulate::SimulateArguments),
     Study(study::StudyArguments),
     Completions(completions::CompletionsArguments),
 }
@@ -32,6 +34,7 @@ impl Command {
             Command::Evaluate(arguments) => arguments.run(console),
             Command::Convert(arguments) => arguments.run(console),
             Command::Config(command) => command.run(console),
+            Command::Simulate(arguments) => arguments.run(console),
             Command::Study(arguments) => arguments.run(console),
             Command::Completions(arguments) => arguments.run(),
         }

@@ -1,81 +1,239 @@
 //! `tercel study`.
 
-use std::path::PathBuf;
+mod merge;
 
-use clap::Args;
-use tercel_study::autoferry;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use tercel_study::monte_carlo::{Experiment, Results, Shard, conduct};
+use tercel_study::studies::{Choice, Kind, STUDIES, Study};
+use tercel_study::{StudyTable, autoferry};
 
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output;
+use crate::progress::Progress;
 
-/// Run a study: a scenario, several trackers, their scores.
+/// Run a study: a scenario, several methods, their scores.
+///
+/// Prints a table with mean, standard deviation, 95 % bootstrap interval and, where there is one, the published figure. The
+/// numbers are the same to the last bit for any number of threads; only the time for a step differs.
+///
+/// A long study can be shared among machines: run it with --shard 1/4 to 4/4 and the same -o, and join the files with
+/// `tercel study merge`. A shard whose file is there is not computed again, so an interrupted study goes on where it was.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_long_help = AFTER)]
 pub struct StudyArguments {
-    /// Which one.
-    #[arg(value_name = "NAME")]
-    name: String,
-    /// Folder with the recordings of a study on real data.
-    #[arg(long, value_name = "DIR")]
-    pub data: Option<PathBuf>,
+    #[command(subcommand)]
+    command: Option<StudyCommand>,
+    /// Which one; `tercel study list` lists them.
+    #[arg(value_name = "NAME", required = true)]
+    name: Option<String>,
     /// Methods to run, with commas between them; without it, all of the study.
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
-    pub methods: Option<Vec<String>>,
-    /// Folder for the tracks, the table of metrics and the report.
+    methods: Option<Vec<String>>,
+    /// Number of runs.
+    #[arg(long, value_name = "N")]
+    runs: Option<u64>,
+    /// Seed of the random numbers; that of the published figures unless another is given.
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+    /// Set of scenes, for a study that has several.
+    #[arg(long, value_name = "SET")]
+    set: Option<String>,
+    /// Compute a share of the runs, 1/4 to 4/4, into a file in the folder of -o.
+    #[arg(long, value_name = "I/N", requires = "output")]
+    shard: Option<Shard>,
+    /// Compute a shard even if its file is there.
+    #[arg(long, requires = "shard")]
+    force: bool,
+    /// Threads to use; without it, one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Folder with the recordings of a study on real data.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Folder for the table, the numbers of every run and the report.
     #[arg(long, short, value_name = "DIR")]
-    pub output: Option<PathBuf>,
+    output: Option<PathBuf>,
     /// Print one JSON object instead of a table.
     #[arg(long)]
-    pub json: bool,
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum StudyCommand {
+    Merge(merge::MergeArguments),
+    /// List the studies with their methods.
+    #[command(after_long_help = LIST_AFTER)]
+    List,
 }
 
 const AFTER: &str = "\
 Studies:
-  autoferry  radar and lidar of a small ferry against the GNSS truth of two boats
+  atc-test     one aircraft that turns, seen by a radar: the published test set
+  atc-hshm     the same at high speed with hard turns
+  atc-noise    errors over the bearing noise of the radar (--set test or hshm)
+  atc-missing  errors over the detection probability of the radar (--set test or hshm)
+  autoferry    radar and lidar of a small ferry against the GNSS truth of two boats
 
 Examples:
-  tercel study autoferry --methods nearest-neighbour,phd
+  tercel study atc-test --runs 100 --methods imm,imm-paper
+  tercel study atc-noise --set hshm -o results
+  tercel study atc-test --shard 1/2 -o shards && tercel study atc-test --shard 2/2 -o shards
+  tercel study merge shards -o results
   tercel study autoferry --data data/autoferry --json -o results";
 
-/// A study that the program knows.
-struct Study {
-    name: &'static str,
-    run: fn(&StudyArguments, &Console) -> Result<(), Failure>,
-}
-
-const STUDIES: [Study; 1] = [Study { name: "autoferry", run: autoferry }];
+const LIST_AFTER: &str = "\
+Examples:
+  tercel study list";
 
 impl StudyArguments {
     /// Runs the study of that name.
     pub fn run(&self, console: &Console) -> Result<(), Failure> {
-        match STUDIES.iter().find(|study| study.name == self.name) {
-            Some(study) => (study.run)(self, console),
-            None => {
-                let known: Vec<&str> = STUDIES.iter().map(|study| study.name).collect();
-                let message =
-                    format!("there is no study `{}`; known studies: {}", self.name, known.join(", "));
-                Err(Failure::usage(message))
+        match (&self.command, &self.name) {
+            (Some(StudyCommand::Merge(arguments)), _) => arguments.run(console),
+            (Some(StudyCommand::List), _) => output::print(&list()),
+            (None, Some(name)) => {
+                let study = Study::find(name)?;
+                match study.kind {
+                    Kind::Recordings => self.run_recordings(study, console),
+                    Kind::MonteCarlo(_) => self.run_drawn(study, console),
+                }
+            }
+            // The parser asks for a name where there is no command.
+            (None, None) => Err(Failure::usage("name a study")),
+        }
+    }
+
+    fn run_drawn(&self, study: &Study, console: &Console) -> Result<(), Failure> {
+        if self.data.is_some() {
+            let message = format!("the study {} draws its scenes and takes no --data", study.name);
+            return Err(Failure::usage(message));
+        }
+        if self.shard.is_some() && self.json {
+            return Err(Failure::usage("--json prints a table, and a shard has none before it is merged"));
+        }
+        let choice =
+            Choice { seed: self.seed, runs: self.runs, methods: self.methods.clone(), set: self.set.clone() };
+        let experiment = study.experiment(&choice)?;
+        match (self.shard, &self.output) {
+            (Some(shard), Some(folder)) => self.run_shard(&*experiment, shard, folder, console),
+            _ => {
+                let results = self.conduct(&*experiment, Shard::WHOLE, console)?;
+                finish(&*experiment, &results, self.output.as_deref(), self.json, console)
             }
         }
+    }
+
+    fn conduct(
+        &self,
+        experiment: &dyn Experiment,
+        shard: Shard,
+        console: &Console,
+    ) -> Result<Results, Failure> {
+        let plan = experiment.plan();
+        let progress = Progress::bar(console, "running", shard.runs(plan.runs).count() * plan.conditions());
+        Ok(conduct(experiment, shard, self.threads.map(usize::from), &|| progress.step())?)
+    }
+
+    fn run_shard(
+        &self,
+        experiment: &dyn Experiment,
+        shard: Shard,
+        folder: &Path,
+        console: &Console,
+    ) -> Result<(), Failure> {
+        let plan = experiment.plan();
+        let path = folder.join(Results::file_name(plan, shard));
+        if path.exists() && !self.force {
+            let there = Results::read(&path).map_err(|error| {
+                Failure::from(error).with_help("--force computes the shard again and replaces the file")
+            })?;
+            if there.plan != *plan {
+                let message = format!("{} holds other runs, methods or options", path.display());
+                let help = "take another folder, or replace it with --force";
+                return Err(Failure::input(message).with_help(help));
+            }
+            console.note(format!("{} is there already and is kept", path.display()));
+            return Ok(());
+        }
+        std::fs::create_dir_all(folder)
+            .map_err(|error| Failure::failed(format!("{}: cannot create: {error}", folder.display())))?;
+        let results = self.conduct(experiment, shard, console)?;
+        results.write(&path)?;
+        for line in results.failures() {
+            console.warn(line);
+        }
+        console.note(format!("shard {shard} is in {}", path.display()));
+        Ok(())
+    }
+
+    fn run_recordings(&self, study: &Study, console: &Console) -> Result<(), Failure> {
+        let drawn = [
+            ("--runs", self.runs.is_some()),
+            ("--seed", self.seed.is_some()),
+            ("--set", self.set.is_some()),
+            ("--shard", self.shard.is_some()),
+            ("--threads", self.threads.is_some()),
+        ];
+        if let Some((option, _)) = drawn.iter().find(|(_, given)| *given) {
+            let message = format!(
+                "the study {} takes no {option}: it has recordings, and nothing is drawn",
+                study.name
+            );
+            return Err(Failure::usage(message));
+        }
+        let folder = self.data.clone().unwrap_or_else(|| RECORDINGS.into());
+        let methods = study.methods(self.methods.as_deref())?;
+        let result = autoferry::run(&folder, &methods, 0, &|what| console.note(what))?;
+        if let Some(folder) = &self.output {
+            result.write(folder)?;
+            let files = "tracks, metrics.csv, study.json and report.html";
+            console.note(format!("{files} are in {}", folder.display()));
+        }
+        if self.json { print_json(&result.table) } else { output::print(&result.text()) }
     }
 }
 
 /// The recordings that come with the source code.
 const RECORDINGS: &str = "data/autoferry";
 
-fn autoferry(arguments: &StudyArguments, console: &Console) -> Result<(), Failure> {
-    let folder = arguments.data.clone().unwrap_or_else(|| RECORDINGS.into());
-    let methods = arguments.methods.clone().unwrap_or_else(|| autoferry::METHODS.map(str::to_owned).to_vec());
-    let result = autoferry::run(&folder, &methods, 0, &|what| console.note(what))?;
-    if let Some(folder) = &arguments.output {
-        result.write(folder)?;
-        console.note(format!("tracks, metrics.csv, study.json and report.html are in {}", folder.display()));
+/// Writes and prints the results of all runs.
+fn finish(
+    experiment: &dyn Experiment,
+    results: &Results,
+    folder: Option<&Path>,
+    json: bool,
+    console: &Console,
+) -> Result<(), Failure> {
+    let table = results.table(experiment);
+    if let Some(folder) = folder {
+        results.publish(experiment, &table, folder)?;
+        let files = "study.json, metrics.csv, report.html and the tables of an example";
+        console.note(format!("{files} are in {}", folder.display()));
     }
-    if arguments.json {
-        let table = serde_json::to_value(&result.table)
-            .map_err(|error| Failure::failed(format!("cannot encode the table: {error}")))?;
-        return output::print_json(&table);
+    if json {
+        for line in results.failures() {
+            console.warn(line);
+        }
+        return print_json(&table);
     }
-    output::print(&result.text())
+    output::print(&results.text(&table))
+}
+
+fn print_json(table: &StudyTable) -> Result<(), Failure> {
+    let text = serde_json::to_string(table)
+        .map_err(|error| Failure::failed(format!("cannot encode the table: {error}")))?;
+    output::print(&format!("{text}\n"))
+}
+
+fn list() -> String {
+    let width = STUDIES.iter().map(|study| study.name.len()).max().unwrap_or(0);
+    let line = |study: &Study| {
+        let methods = study.methods.join(", ");
+        format!("{:width$}  {}\n{:width$}  methods: {methods}\n", study.name, study.about, "")
+    };
+    STUDIES.iter().map(line).collect()
 }

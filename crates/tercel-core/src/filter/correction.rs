@@ -6,7 +6,7 @@ use super::Innovation;
 use crate::belief::{Cholesky, Gaussian, positive};
 use crate::error::FilterError;
 use crate::motion::Motion;
-use crate::sensor::{Measurement, Sensor};
+use crate::sensor::{Measurement, Reading, Sensor};
 
 /// A measurement compared with a Gaussian belief through a linearised sensor.
 pub(super) struct Comparison<const N: usize, const M: usize> {
@@ -28,7 +28,16 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         belief: &Gaussian<N>,
         measurement: &Measurement<M>,
     ) -> Result<Self, FilterError> {
-        let reading = sensor.read(measurement);
+        Comparison::of_reading(sensor, belief, &sensor.read(measurement))
+    }
+
+    /// Compares a reading that was taken before, when many beliefs are compared with one measurement.
+    #[inline(always)]
+    pub fn of_reading(
+        sensor: &impl Sensor<N, M>,
+        belief: &Gaussian<N>,
+        reading: &Reading<M>,
+    ) -> Result<Self, FilterError> {
         let residual = sensor.difference(&reading.value, &sensor.expected(&belief.mean));
         if !residual.iter().all(|x| x.is_finite()) {
             return Err(FilterError::NotFinite { what: "innovation" });

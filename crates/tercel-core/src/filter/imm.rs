@@ -170,8 +170,12 @@ impl<F> Imm<F> {
             modes[j].weight = total.max(FLOOR);
             // Without anything from other modes, mixing would only round.
             if total > flow(j) {
-                let parts = (0..count).map(|i| (flow(i) / total, &modes[i].state));
-                let mixed = moments(parts.filter(|(weight, _)| *weight > 0.0));
+                let parts = (0..count).filter_map(|i| {
+                    let flow = flow(i);
+                    // In a joint transition with a part that never changes, nearly nothing flows.
+                    (flow > 0.0).then(|| (flow / total, &modes[i].state))
+                });
+                let mixed = moments(parts);
                 filter.set_state(&mut modes[j].belief, &mixed);
             }
         }

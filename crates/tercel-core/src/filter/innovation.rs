@@ -54,17 +54,29 @@ pub(super) struct Blend {
 impl Blend {
     /// Adds a mode of this probability before the measurement. Returns the logarithm of its weight after it, `ln cΛ`.
     pub fn add(&mut self, probability: f64, innovation: &Innovation) -> f64 {
-        let weight = probability.ln() + innovation.log_likelihood;
+        self.add_weighted(probability, probability.ln(), innovation)
+    }
+
+    /// The same for a caller that holds the logarithm of the probability, which may be too small for a double.
+    #[inline]
+    pub fn add_weighted(&mut self, probability: f64, ln_probability: f64, innovation: &Innovation) -> f64 {
+        let weight = ln_probability + innovation.log_likelihood;
         // A likelihood that overflowed or is not a number counts as zero.
         let weight = if weight < f64::INFINITY { weight } else { f64::NEG_INFINITY };
-        let top = self.top.map_or(weight, |top| top.max(weight));
-        if top > f64::NEG_INFINITY {
-            let shrink = self.top.map_or(0.0, |old| (old - top).exp());
+        let top = self.top.unwrap_or(weight);
+        if weight > top {
+            let shrink = (top - weight).exp();
+            self.likelihood = self.likelihood * shrink + 1.0;
+            self.nis = self.nis * shrink + innovation.nis;
+        } else if top > f64::NEG_INFINITY {
             let share = (weight - top).exp();
-            self.likelihood = self.likelihood * shrink + share;
-            self.nis = self.nis * shrink + share * innovation.nis;
+            self.likelihood += share;
+            // What has no share may be infinitely far away.
+            if share > 0.0 {
+                self.nis += share * innovation.nis;
+            }
         }
-        self.top = Some(top);
+        self.top = Some(top.max(weight));
         self.probability += probability;
         for (sum, component) in self.residual.iter_mut().zip(innovation.residual()) {
             *sum += probability * component;

@@ -7,6 +7,7 @@
 //! | [`Unscented`] | Gaussian | bent motion and sensor: second order, no Jacobians |
 //! | [`Imm`] | one belief and one probability per mode | motion that changes between models |
 //! | [`Particle`] | weighted states | any motion, any sensor |
+//! | [`RaoBlackwellised`] | weighted histories of the motion, a Gaussian for each | motion whose parameters jump: the limit of what can be known |
 //! | [`Padded`] | Gaussian | a model with a smaller state beside one with a larger |
 
 mod correction;
@@ -18,8 +19,11 @@ mod innovation;
 mod kalman;
 mod padded;
 mod particle;
+mod rao_blackwell;
+mod sampling;
 mod sigma;
 mod transition;
+mod turn_bank;
 mod unscented;
 
 use nalgebra::{SMatrix, Vector2};
@@ -34,8 +38,10 @@ pub use innovation::Innovation;
 pub use kalman::Kalman;
 pub use padded::Padded;
 pub use particle::{Particle, Particles};
+pub use rao_blackwell::{Hypotheses, Hypothesis, RandomTurns, RaoBlackwellised, Regime, Turning};
 pub use sigma::SigmaPoints;
 pub use transition::Transition;
+pub use turn_bank::TurnBank;
 pub use unscented::Unscented;
 
 /// A recursion over a belief about one object, whose state has `N` components.

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Filter, Innovation};
+use super::{Filter, Innovation, sampling};
 use crate::belief::{Cholesky, Gaussian, positive};
 use crate::error::FilterError;
 use crate::motion::Motion;
@@ -109,7 +109,7 @@ impl<const N: usize> Particles<N> {
 
     /// Number of equally weighted particles that would say as much: `1 / Σ wᵢ²`.
     pub fn effective(&self) -> f64 {
-        1.0 / self.weights.iter().map(|weight| (2.0 * weight).exp()).sum::<f64>()
+        sampling::effective(&self.weights)
     }
 
     fn weighted(&self) -> impl Iterator<Item = (f64, &SVector<f64, N>)> {
@@ -136,25 +136,12 @@ impl<const N: usize> Particles<N> {
     /// and those of `other`, whose weights count `other_share` against the rest.
     fn resample(&mut self, count: usize, other: Option<(&Particles<N>, f64)>) {
         let share = 1.0 - other.map_or(0.0, |(_, share)| share);
-        let step = 1.0 / count as f64;
-        let mut mark = self.random.random::<f64>() * step;
-        let mut sum = 0.0;
-        let chosen = &mut self.room.states;
-        chosen.clear();
         let others = other.into_iter().flat_map(|(particles, share)| {
-            particles.weights.iter().map(move |weight| share * weight.exp()).zip(&particles.states)
+            particles.weighted().map(move |(weight, state)| (share * weight, state))
         });
         let own = self.weights.iter().map(|weight| share * weight.exp()).zip(&self.states);
-        for (weight, state) in own.chain(others) {
-            sum += weight;
-            while mark < sum && chosen.len() < count {
-                chosen.push(*state);
-                mark += step;
-            }
-        }
-        // The weights add up to one only up to rounding, so the last mark may lie beyond their sum.
-        let last = chosen.last().or(self.states.last()).copied().unwrap_or_else(SVector::zeros);
-        chosen.resize(count, last);
+        let offset = self.random.random();
+        sampling::resample(own.chain(others), offset, count, &mut self.room.states);
         std::mem::swap(&mut self.states, &mut self.room.states);
         self.weights.clear();
         self.weights.resize(count, -(count as f64).ln());
@@ -290,7 +277,7 @@ where
     fn birth(&self, measurement: &Measurement<M>) -> Result<Particles<N>, FilterError> {
         let start = self.sensor.birth(measurement, &self.motion.prior())?;
         let lower = *Cholesky::new(&start.covariance, "state covariance")?.lower();
-        let mut random = ChaCha8Rng::seed_from_u64(seed_of(self.seed, measurement));
+        let mut random = ChaCha8Rng::seed_from_u64(sampling::seed_of(self.seed, measurement));
         let states: Vec<_> = (0..self.count).map(|_| start.mean + lower * normal(&mut random)).collect();
         let weights = vec![-(self.count as f64).ln(); self.count];
         let room = Room { states: Vec::with_capacity(self.count), weights: Vec::with_capacity(self.count) };
@@ -379,15 +366,6 @@ where
 /// A vector of independent standard normal components.
 fn normal<const N: usize>(random: &mut ChaCha8Rng) -> SVector<f64, N> {
     SVector::from_fn(|_, _| StandardNormal.sample(random))
-}
-
-/// A seed that differs with every measurement: FNV-1a over the bytes of the filter's seed and the measured values.
-fn seed_of<const M: usize>(seed: u64, measurement: &Measurement<M>) -> u64 {
-    let values = measurement.value.iter().map(|value| value.to_bits());
-    std::iter::once(seed)
-        .chain(values)
-        .flat_map(u64::to_le_bytes)
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 #[cfg(test)]

@@ -1,8 +1,13 @@
 //! How an object changes between modes of motion.
 
+mod chain;
+
 use nalgebra::DMatrix;
 
 use crate::error::FilterError;
+
+pub(super) use chain::Chain;
+use chain::Link;
 
 /// How probable each change of mode is, over a step or over time.
 ///
@@ -32,6 +37,7 @@ enum Form {
     Sticky(f64),
     Rows(DMatrix<f64>),
     Rates(DMatrix<f64>),
+    Joint(Vec<(Transition, usize)>),
 }
 
 /// How far a row of probabilities may be from the sum of one.
@@ -85,8 +91,48 @@ impl Transition {
         Ok(Transition { form: Form::Rates(matrix), interval: None })
     }
 
+    /// Several things that change independently of each other, each with its number of modes: a mode of the whole is one mode
+    /// of each part, and those of the last part run fastest. With turn rates `r0, r1` and noise levels `a, b, c` the modes are
+    /// `r0 a, r0 b, r0 c, r1 a, r1 b, r1 c`.
+    ///
+    /// The matrix is the Kronecker product `Π₁ ⊗ Π₂ ⊗ ..` of those of the parts; for parts in continuous time, the exponential
+    /// of the Kronecker sum of their generators. Parts per step and parts per time may stand side by side.
+    ///
+    /// Whether each part fits its number of modes is checked when the filter is built.
+    ///
+    /// An object that turns at one of three rates, seen by a radar whose accuracy is not known but stays as it is:
+    ///
+    /// ```
+    /// use tercel_core::{filter::{Filter, Imm, Kalman, Transition}, motion::Turn, sensor::Position};
+    ///
+    /// let (rates, levels) = ([0.0, 0.1, -0.1], [2.0, 8.0, 32.0]);
+    /// let mut bank = Vec::new();
+    /// for rate in rates {
+    ///     for level in levels {
+    ///         bank.push(Kalman::new(Turn::new(rate, 0.1), Position::<2>::new(level)?));
+    ///     }
+    /// }
+    /// let (turns, noise) = (Transition::sticky(0.95).per(1.0), Transition::sticky(1.0));
+    /// let imm = Imm::new(bank, Transition::joint([(turns, rates.len()), (noise, levels.len())]))?;
+    ///
+    /// let mut belief = imm.birth(&[0.0, 0.0].into())?;
+    /// for second in 1..=40 {
+    ///     // A straight flight, with errors of about eight metres.
+    ///     let error = [9.0, -4.0, 7.0, -11.0, 3.0, -8.0, 10.0][second % 7];
+    ///     imm.predict(&mut belief, 1.0);
+    ///     imm.update(&mut belief, &[50.0 * second as f64 + error, -error].into())?;
+    /// }
+    /// let modes = imm.mode_probabilities(&belief);
+    /// let level = |l: usize| -> f64 { (0..rates.len()).map(|r| modes[r * levels.len() + l]).sum() };
+    /// assert!(level(1) > 0.99, "{modes:?}");
+    /// # Ok::<(), tercel_core::error::FilterError>(())
+    /// ```
+    pub fn joint(parts: impl IntoIterator<Item = (Transition, usize)>) -> Self {
+        Transition { form: Form::Joint(parts.into_iter().collect()), interval: None }
+    }
+
     /// Says that the probabilities hold over `interval` seconds, so that they scale with the length of a step. Rates
-    /// scale anyway, and stay as they are.
+    /// scale anyway, and stay as they are. Of a [`joint`](Transition::joint) transition it says so of every part.
     ///
     /// Not every matrix belongs to a process in continuous time. That this one does is checked when the filter is built;
     /// every diagonal entry must exceed one half.
@@ -96,95 +142,43 @@ impl Transition {
 
     /// The chain over this many modes.
     pub(super) fn chain(&self, modes: usize) -> Result<Chain, FilterError> {
-        let matrix = match &self.form {
-            Form::Sticky(stay) => sticky(FilterError::probability("stay", *stay)?, modes),
-            Form::Rows(matrix) | Form::Rates(matrix) => matrix.clone(),
-        };
-        if matrix.nrows() != modes {
+        let mut links = Vec::new();
+        let size = self.link(modes, self.interval, &mut links)?;
+        if size != modes {
             let (parameter, expected) = ("number of modes", "must be the size of the transition matrix");
             return Err(FilterError::Parameter { parameter, value: modes as f64, expected });
         }
-        match (&self.form, self.interval) {
-            (Form::Rates(_), _) => Ok(Chain::rates(&matrix)),
-            (_, None) => Ok(Chain { modes, matrix: rows_of(&matrix), rate: None }),
+        Ok(Chain::new(modes, links))
+    }
+
+    /// Appends the independent parts of this transition between `modes` modes, when their probabilities hold over `interval`,
+    /// and returns the number of modes that they have together.
+    fn link(&self, modes: usize, interval: Option<f64>, links: &mut Vec<Link>) -> Result<usize, FilterError> {
+        let matrix = match &self.form {
+            Form::Joint(parts) => {
+                return parts.iter().try_fold(1_usize, |size, (part, modes)| {
+                    let own = part.link(*modes, interval.or(part.interval), links)?;
+                    if own != *modes {
+                        let parameter = "number of modes of a part of a joint transition";
+                        let expected = "must be the size of the part's transition matrix, at least 1";
+                        return Err(FilterError::Parameter { parameter, value: *modes as f64, expected });
+                    }
+                    Ok(size.saturating_mul(own))
+                });
+            }
+            Form::Sticky(stay) => sticky(FilterError::probability("stay", *stay)?, modes.max(1)),
+            Form::Rows(matrix) | Form::Rates(matrix) => matrix.clone(),
+        };
+        links.push(match (&self.form, interval) {
+            (Form::Rates(_), _) => Link::rates(&matrix),
+            (_, None) => Link::steps(&matrix),
             (_, Some(interval)) => {
                 let interval = FilterError::positive("transition interval", interval)?;
-                Ok(Chain::rates(&(generator(&matrix)? / interval)))
+                Link::rates(&(generator(&matrix)? / interval)).stated(&matrix, interval)
             }
-        }
+        });
+        Ok(matrix.nrows())
     }
-}
-
-/// Modes and the probabilities of their changes over any step.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chain {
-    modes: usize,
-    /// Row by row: probabilities of a step, or the generator divided by `rate`, plus the identity.
-    matrix: Vec<f64>,
-    rate: Option<f64>,
-}
-
-impl Chain {
-    fn rates(generator: &DMatrix<f64>) -> Chain {
-        let modes = generator.nrows();
-        let rate = generator.diagonal().iter().fold(0.0_f64, |top, x| top.max(-x)).max(f64::MIN_POSITIVE);
-        let jumps = DMatrix::identity(modes, modes) + generator / rate;
-        Chain { modes, matrix: rows_of(&jumps), rate: Some(rate) }
-    }
-
-    /// The probabilities of changes over `dt`, row by row. `work` is overwritten and holds them when they had to be computed.
-    pub fn over<'a>(&'a self, dt: f64, work: &'a mut Vec<f64>) -> &'a [f64] {
-        let Some(rate) = self.rate else {
-            return &self.matrix;
-        };
-        let size = self.modes * self.modes;
-        work.clear();
-        work.resize(3 * size, 0.0);
-        let (sum, rest) = work.split_at_mut(size);
-        let (power, next) = rest.split_at_mut(size);
-        // exp(G t) = Σ e^(-λt) (λt)ⁿ / n! Jⁿ with the jump matrix J = I + G / λ: a sum of probabilities, so nothing
-        // cancels. Long steps are halved until the series is short, and squared back.
-        let halvings = if rate * dt > 1.0 { (rate * dt).log2().ceil().min(60.0) as i32 } else { 0 };
-        let jumps = rate * dt * 0.5_f64.powi(halvings);
-        let mut weight = (-jumps).exp();
-        for i in 0..self.modes {
-            power[i * self.modes + i] = 1.0;
-            sum[i * self.modes + i] = weight;
-        }
-        for n in 1..24 {
-            product(self.modes, power, &self.matrix, next);
-            power.copy_from_slice(next);
-            weight *= jumps / f64::from(n);
-            for (total, value) in sum.iter_mut().zip(power.iter()) {
-                *total += weight * value;
-            }
-            if weight < 1e-18 {
-                break;
-            }
-        }
-        for _ in 0..halvings {
-            product(self.modes, sum, sum, next);
-            sum.copy_from_slice(next);
-            // Squaring doubles what rounding added to a row; dividing by its sum keeps it a row of probabilities.
-            for row in sum.chunks_exact_mut(self.modes) {
-                let total: f64 = row.iter().sum();
-                row.iter_mut().for_each(|value| *value /= total);
-            }
-        }
-        &work[..size]
-    }
-}
-
-fn product(n: usize, a: &[f64], b: &[f64], out: &mut [f64]) {
-    for i in 0..n {
-        for j in 0..n {
-            out[i * n + j] = (0..n).map(|k| a[i * n + k] * b[k * n + j]).sum();
-        }
-    }
-}
-
-fn rows_of(matrix: &DMatrix<f64>) -> Vec<f64> {
-    matrix.transpose().as_slice().to_vec()
 }
 
 fn sticky(stay: f64, modes: usize) -> DMatrix<f64> {
@@ -247,54 +241,4 @@ fn generator(matrix: &DMatrix<f64>) -> Result<DMatrix<f64>, FilterError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn over(chain: &Chain, dt: f64) -> DMatrix<f64> {
-        let mut work = Vec::new();
-        DMatrix::from_row_slice(chain.modes, chain.modes, chain.over(dt, &mut work))
-    }
-
-    #[test]
-    fn an_interval_gives_the_stated_probabilities_back_and_scales_between() {
-        let rows = [[0.9, 0.08, 0.02], [0.05, 0.9, 0.05], [0.01, 0.04, 0.95]];
-        let chain = Transition::from_rows(rows).unwrap().per(3.0).chain(3).unwrap();
-        let stated = DMatrix::from_fn(3, 3, |i, j| rows[i][j]);
-        assert!((over(&chain, 3.0) - &stated).amax() < 1e-14);
-        assert!((over(&chain, 6.0) - &stated * &stated).amax() < 1e-14);
-        assert!((over(&chain, 1.3) * over(&chain, 1.7) - &stated).amax() < 1e-14);
-        assert_eq!(over(&chain, 0.0), DMatrix::identity(3, 3));
-    }
-
-    #[test]
-    fn rates_of_two_modes_agree_with_the_closed_form() {
-        let (out, back) = (0.02, 0.3);
-        let chain = Transition::from_rates([[0.0, out], [back, 0.0]]).unwrap().chain(2).unwrap();
-        for dt in [1e-3, 1.0, 7.0, 1e3, 1e9] {
-            let change = out / (out + back) * -f64::exp_m1(-(out + back) * dt);
-            assert!((over(&chain, dt)[(0, 1)] - change).abs() < 1e-14, "{dt}");
-        }
-    }
-
-    #[test]
-    fn a_step_is_a_step_however_long() {
-        let chain = Transition::sticky(0.9).chain(3).unwrap();
-        assert_eq!(over(&chain, 0.1), over(&chain, 10.0));
-        assert!((over(&chain, 1.0)[(0, 1)] - 0.05).abs() < 1e-16);
-    }
-
-    #[test]
-    fn what_is_not_a_transition_is_refused() {
-        assert!(Transition::from_rows([[0.9, 0.2], [0.1, 0.9]]).is_err());
-        assert!(Transition::from_rows([[1.1, -0.1], [0.1, 0.9]]).is_err());
-        assert!(Transition::from_rows([vec![1.0], vec![0.5, 0.5]]).is_err());
-        assert!(Transition::from_rows(Vec::<Vec<f64>>::new()).is_err());
-        assert!(Transition::from_rates([[0.0, -1.0], [1.0, 0.0]]).is_err());
-        assert!(Transition::sticky(1.2).chain(2).is_err());
-        assert!(Transition::sticky(0.4).per(1.0).chain(2).is_err());
-        assert!(Transition::from_rows([[0.9, 0.1], [0.1, 0.9]]).unwrap().chain(3).is_err());
-        // A cycle that only turns one way skips a mode faster than any process in continuous time could.
-        let cycle = [[0.8, 0.2, 0.0], [0.0, 0.8, 0.2], [0.2, 0.0, 0.8]];
-        assert!(Transition::from_rows(cycle).unwrap().per(1.0).chain(3).is_err());
-    }
-}
+mod tests;

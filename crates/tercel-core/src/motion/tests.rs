@@ -70,6 +70,17 @@ fn the_short_cut_through_the_covariance_is_the_product() {
     let f = Motion::<6>::jacobian(&motion, &start.mean, 1.7);
     let plain = f * start.covariance * f.transpose() + Motion::<6>::noise(&motion, &start.mean, 1.7);
     assert!((quick.covariance - plain).amax() < 1e-12);
+
+    let start: Gaussian<4> = start.leading();
+    for (rate, dt) in [(0.0, 1.7), (0.3, 1.7), (-0.9, 4.0), (1e-8, 2.0), (0.2, 0.0)] {
+        for noise in [AccelerationNoise::Piecewise(0.7), AccelerationNoise::White(0.4)] {
+            let turn = Turn::with_noise(rate, noise);
+            let (quick, f) = (turn.predict(&start, dt), turn.jacobian(&start.mean, dt));
+            let plain = f * start.covariance * f.transpose() + turn.noise(&start.mean, dt);
+            assert!((quick.covariance - plain).amax() < 1e-12 * plain.amax(), "{rate} {dt}");
+            assert!((quick.mean - f * start.mean).amax() < 1e-12, "{rate} {dt}");
+        }
+    }
 }
 
 #[test]

@@ -68,7 +68,7 @@ struct Pass<'a>(&'a mut [f32], Activation);
 
 impl Kernel for Pass<'_> {
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+    fn run<A: Arithmetic>(self, _: A) {
         match self.1 {
             Activation::Relu => relu_pass(self.0),
             Activation::Exp => self.0.iter_mut().for_each(|x| *x = exp_of::<A>(*x)),
@@ -81,8 +81,11 @@ impl Kernel for Pass<'_> {
 
 #[inline(always)]
 pub(super) fn relu_pass(values: &mut [f32]) {
-    // `f32::max` would turn what is not a number into zero.
-    values.iter_mut().for_each(|x| *x = if *x < 0.0 { 0.0 } else { *x });
+    // `f32::max` would turn what is not a number into zero, and an assignment in one of two branches becomes a masked store.
+    for x in values {
+        let keep = if *x < 0.0 { 0 } else { u32::MAX };
+        *x = f32::from_bits(x.to_bits() & keep);
+    }
 }
 
 #[inline(always)]
@@ -111,7 +114,7 @@ fn split<A: Arithmetic>(x: f32) -> (i32, f32) {
     let mut p = 1.991_852_6e-4;
     p = A::fused(p, r, 1.394_617_7e-3);
     p = A::fused(p, r, 8.333_264e-3);
-    p = A::fused(p, r, 4.166_626_9e-2);
+    p = A::fused(p, r, 4.166_627e-2);
     p = A::fused(p, r, 1.666_666_7e-1);
     p = A::fused(p, r, 0.5);
     let power = A::fused(p, r * r, r) + 1.0;

@@ -96,12 +96,12 @@ struct Step<'a> {
 
 impl Kernel for Step<'_> {
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+    fn run<A: Arithmetic>(self, machine: A) {
         let Step { layer, input, memory, from_input, from_memory } = self;
         super::fill_rows(&layer.input_bias, from_input);
-        layer.input.add_product::<A>(input, from_input);
+        layer.input.add_product(machine, input, from_input);
         super::fill_rows(&layer.hidden_bias, from_memory);
-        layer.hidden.add_product::<A>(memory, from_memory);
+        layer.hidden.add_product(machine, memory, from_memory);
         let size = layer.size();
         let rows = from_input.chunks_exact_mut(3 * size).zip(from_memory.chunks_exact(3 * size));
         for ((x, h), memory) in rows.zip(memory.chunks_exact_mut(size)) {

@@ -81,9 +81,9 @@ struct Forward<'a> {
 
 impl Kernel for Forward<'_> {
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+    fn run<A: Arithmetic>(self, machine: A) {
         super::fill_rows(&self.layer.bias, self.output);
-        self.layer.weight.add_product::<A>(self.input, self.output);
+        self.layer.weight.add_product(machine, self.input, self.output);
         if self.relu {
             relu_pass(self.output);
         }

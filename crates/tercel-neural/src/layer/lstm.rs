@@ -83,11 +83,11 @@ struct Step<'a> {
 
 impl Kernel for Step<'_> {
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+    fn run<A: Arithmetic>(self, machine: A) {
         let Step { layer, input, output, cell, gates } = self;
         super::fill_rows(&layer.bias, gates);
-        layer.input.add_product::<A>(input, gates);
-        layer.hidden.add_product::<A>(output, gates);
+        layer.input.add_product(machine, input, gates);
+        layer.hidden.add_product(machine, output, gates);
         let size = layer.size();
         let rows = gates.chunks_exact_mut(4 * size).zip(cell.chunks_exact_mut(size));
         for ((gates, cell), output) in rows.zip(output.chunks_exact_mut(size)) {

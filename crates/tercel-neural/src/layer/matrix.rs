@@ -1,9 +1,9 @@
 //! Weight matrices, packed for products with a few rows.
 
-use super::dispatch::Arithmetic;
+use super::dispatch::{Arithmetic, LANES};
 
 /// Weights that are used together: eight vectors of eight, which is what the registers hold as running sums.
-const CHUNK: usize = 64;
+const CHUNK: usize = 8 * LANES;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
@@ -76,17 +76,17 @@ impl Matrix {
     ///
     /// The sums of a row do not depend on what other rows there are.
     #[inline(always)]
-    pub fn add_product<A: Arithmetic>(&self, input: &[f32], output: &mut [f32]) {
+    pub fn add_product<A: Arithmetic>(&self, machine: A, input: &[f32], output: &mut [f32]) {
         for panel in &self.panels {
             let depth = CHUNK / panel.width;
             let chunks = &self.chunks[panel.chunk..][..self.rows.div_ceil(depth)];
             for (x, y) in input.chunks_exact(self.rows).zip(output.chunks_exact_mut(self.columns)) {
                 let y = &mut y[panel.column..][..panel.used];
                 match panel.width {
-                    64 => accumulate::<A, 64, 1>(x, chunks, y),
-                    32 => accumulate::<A, 32, 2>(x, chunks, y),
-                    16 => accumulate::<A, 16, 4>(x, chunks, y),
-                    _ => accumulate::<A, 8, 8>(x, chunks, y),
+                    64 => accumulate::<A, 64, 1>(machine, x, chunks, y),
+                    32 => accumulate::<A, 32, 2>(machine, x, chunks, y),
+                    16 => accumulate::<A, 16, 4>(machine, x, chunks, y),
+                    _ => accumulate::<A, 8, 8>(machine, x, chunks, y),
                 }
             }
         }
@@ -96,45 +96,54 @@ impl Matrix {
 /// Adds the product of `x` with a panel of `WIDTH` columns, stored `DEPTH` rows to a chunk, to `y`.
 #[inline(always)]
 fn accumulate<A: Arithmetic, const WIDTH: usize, const DEPTH: usize>(
+    machine: A,
     x: &[f32],
     chunks: &[Chunk],
     y: &mut [f32],
 ) {
-    let mut sums = [0.0; CHUNK];
-    let whole = x.chunks_exact(DEPTH);
-    let rest = whole.remainder();
-    for (x, chunk) in whole.zip(chunks) {
-        gather::<A, WIDTH, DEPTH>(x, chunk, &mut sums);
+    let mut sums = [machine.splat(0.0); CHUNK / LANES];
+    let (whole, rest) = x.as_chunks::<DEPTH>();
+    for (x, chunk) in whole.iter().zip(chunks) {
+        gather::<A, WIDTH, DEPTH>(machine, x, chunk, &mut sums);
     }
     if let (false, Some(chunk)) = (rest.is_empty(), chunks.last()) {
         let mut padded = [0.0; DEPTH];
         padded[..rest.len()].copy_from_slice(rest);
-        gather::<A, WIDTH, DEPTH>(&padded, chunk, &mut sums);
+        gather::<A, WIDTH, DEPTH>(machine, &padded, chunk, &mut sums);
     }
-    // Partial sums are added in halves, the same order for every length of `y`.
-    let mut half = CHUNK / 2;
-    while half >= WIDTH {
-        for j in 0..half {
-            sums[j] += sums[j + half];
+    let mut totals = [0.0; WIDTH];
+    for (vector, to) in sums.into_iter().zip((0..WIDTH).step_by(LANES).cycle()) {
+        let to = &mut totals[to..to + LANES];
+        for (total, sum) in to.iter_mut().zip(machine.numbers(vector)) {
+            *total += sum;
         }
-        half /= 2;
     }
-    for (y, sum) in y.iter_mut().zip(&sums[..WIDTH]) {
-        *y += sum;
+    // A length that the compiler knows makes this a few vector instructions.
+    match y.as_mut_array::<WIDTH>() {
+        Some(y) => add(y, &totals),
+        None => add(y, &totals),
     }
 }
 
 #[inline(always)]
+fn add(to: &mut [f32], terms: &[f32]) {
+    for (to, term) in to.iter_mut().zip(terms) {
+        *to += term;
+    }
+}
+
+/// Adds the products of `DEPTH` numbers with the rows of a chunk.
+#[inline(always)]
 fn gather<A: Arithmetic, const WIDTH: usize, const DEPTH: usize>(
-    x: &[f32],
+    machine: A,
+    x: &[f32; DEPTH],
     chunk: &Chunk,
-    sums: &mut [f32; CHUNK],
+    sums: &mut [A::Vector; CHUNK / LANES],
 ) {
-    for (row, &x) in x[..DEPTH].iter().enumerate() {
-        for column in 0..WIDTH {
-            let at = row * WIDTH + column;
-            sums[at] = A::fused(x, chunk.0[at], sums[at]);
-        }
+    let weights = chunk.0.as_chunks::<LANES>().0;
+    for (index, (sum, weights)) in sums.iter_mut().zip(weights).enumerate() {
+        let x = machine.splat(x[index * LANES / WIDTH]);
+        *sum = machine.gather(x, weights, *sum);
     }
 }
 
@@ -147,8 +156,8 @@ mod tests {
 
     impl Kernel for Product<'_> {
         #[inline(always)]
-        fn run<A: Arithmetic>(self) {
-            self.0.add_product::<A>(self.1, self.2);
+        fn run<A: Arithmetic>(self, machine: A) {
+            self.0.add_product(machine, self.1, self.2);
         }
     }
 

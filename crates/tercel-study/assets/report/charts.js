@@ -51,22 +51,40 @@ function createChart(host, chart, clock) {
 }
 
 function chartTraces(chart, colours) {
-  return chart.parts.map((part, i) => {
+  return chart.parts.flatMap((part, i) => {
     const colour = colours.parts[i % colours.parts.length];
     const stacked = chart.form === "stacked";
-    return {
+    const curve = {
       type: "scatter",
       mode: chart.x.length > 1 ? "lines" : "markers",
       name: plotText(part.name),
       x: chart.x,
       y: part.y,
-      line: { color: colour, width: stacked ? 1 : 1.8, shape: chart.form === "steps" ? "hv" : "linear" },
+      line: { color: colour, width: stacked ? 1 : 1.8, shape: chart.form === "steps" ? "hv" : "linear", dash: dashOf(i, colours) },
       marker: { color: colour },
       stackgroup: stacked ? "parts" : undefined,
       hovertemplate: "%{y:.4~g}",
       hoverlabel: { namelength: -1 },
+      legendgroup: String(i),
     };
+    return part.band && chart.form === "lines" ? [...bandTraces(chart.x, part.band, colour, i), curve] : [curve];
   });
+}
+
+/** More parts than colours: the later ones are dashed. */
+function dashOf(index, colours) {
+  return ["solid", "dash", "dot"][Math.floor(index / colours.parts.length) % 3];
+}
+
+/** The area between two edges. It comes and goes with its curve when the legend is clicked. */
+function bandTraces(x, [low, high], colour, index) {
+  const edge = { type: "scatter", mode: "lines", x, line: { width: 0 }, hoverinfo: "skip", showlegend: false, legendgroup: String(index) };
+  return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor: withAlpha(colour, 0.18) }];
+}
+
+/** A colour of the style sheet, `#rrggbb`, with an opacity. */
+function withAlpha(colour, alpha) {
+  return colour + Math.round(255 * alpha).toString(16).padStart(2, "0");
 }
 
 function chartLayout(colours, chart, range) {

@@ -73,7 +73,8 @@ function unpackTrack(track, index, users) {
     if (id !== null) users.set(id, track.id);
   });
   const until = track.until === null ? Infinity : track.until;
-  return { ...track, index, first: track.t[0], last: track.t[last], until, believed: /[CK]/.test(track.status) };
+  const name = track.name === undefined ? String(track.id) : track.name;
+  return { ...track, name, index, first: track.t[0], last: track.t[last], until, believed: /[CK]/.test(track.status) };
 }
 
 function boundsOf(model) {

@@ -257,11 +257,11 @@ function labelTrack(track, row, view, colours, from, labels) {
     const tentative = track.status[row] === "T";
     if (tentative ? !view.tentative : !view.tracks) return;
     const colour = tentative ? colours.tentative : trackColour(track, colours);
-    labels.push({ x: track.x[row], y: track.y[row], text: String(track.id), colour, strong: true });
+    labels.push({ x: track.x[row], y: track.y[row], text: track.name, colour, strong: true });
   } else if (view.tracks && view.trails && track.believed && track.last >= from) {
     const last = track.t.length - 1;
     const colour = trackColour(track, colours);
-    labels.push({ x: track.x[last], y: track.y[last], text: String(track.id), colour, faint: true });
+    labels.push({ x: track.x[last], y: track.y[last], text: track.name, colour, faint: true });
   }
 }
 

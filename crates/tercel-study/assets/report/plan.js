@@ -268,7 +268,7 @@ function describeTrack(model, track, row) {
   model.modes.forEach((name, i) => lines.push([`mode ${name}`, numeral(track.modes[i][row], 2)]));
   const used = track.detection[row];
   lines.push(["detection", used === null ? "none" : String(used)]);
-  return tipLines(`Track ${track.id}`, lines);
+  return tipLines(`Track ${track.name}`, lines);
 }
 
 function describeTruth(model, truth, row) {
@@ -288,6 +288,6 @@ function describeDetection(model, sensor, i) {
   if (detections.rate && detections.rate[i] !== null) lines.push(["range rate", `${numeral(detections.rate[i], 2)} m/s`]);
   if (detections.truth && detections.truth[i] !== null) lines.push(["object", model.objects[detections.truth[i]]]);
   const user = model.users.get(detections.id[i]);
-  lines.push(["used by", user === undefined ? "no track" : `track ${user}`]);
+  lines.push(["used by", user === undefined ? "no track" : `track ${model.trackById.get(user).name}`]);
   return tipLines(`Detection of ${sensor.name}`, lines);
 }

@@ -1,7 +1,7 @@
 // The table of tracks: one row a track, sorted by any column; a click shows the track.
 
 const TRACK_COLUMNS = [
-  { name: "Track", value: (track) => track.id, text: (track) => String(track.id) },
+  { name: "Track", value: (track) => track.id, text: (track) => track.name },
   { name: "First,\u00a0s", value: (track) => track.first, text: (track) => numeral(track.first, 1) },
   { name: "Last,\u00a0s", value: (track) => track.last, text: (track) => numeral(track.last, 1) },
   { name: "Duration,\u00a0s", value: (track) => track.last - track.first, text: (track) => numeral(track.last - track.first, 1) },
@@ -67,7 +67,7 @@ function createTrackTable(host, model, view, visit) {
 function trackRow(track, visit) {
   const colour = track.believed ? `--track-${colourIndex(track)}` : "--tentative";
   const swatch = element("i", { class: "swatch dot", style: `background: var(${colour})` });
-  const button = element("button", { type: "button", "aria-label": `Show track ${track.id}` }, swatch, TRACK_COLUMNS[0].text(track));
+  const button = element("button", { type: "button", "aria-label": `Show track ${track.name}` }, swatch, TRACK_COLUMNS[0].text(track));
   const cells = TRACK_COLUMNS.slice(1).map((column) => element("td", {}, column.text(track)));
   const row = element("tr", { on: { click: () => visit(track.id) } }, element("th", { scope: "row" }, button), ...cells);
   row.dataset.track = track.id;

@@ -23,7 +23,16 @@ pub struct Chart {
     abscissa: String,
     form: Form,
     x: Vec<f64>,
-    parts: Vec<(String, Vec<f64>)>,
+    parts: Vec<Part>,
+}
+
+/// A curve.
+#[derive(Debug, Clone, PartialEq)]
+struct Part {
+    name: String,
+    values: Vec<f64>,
+    /// Lower and upper edge of the band around it.
+    band: Option<[Vec<f64>; 2]>,
 }
 
 /// How the parts of a chart are drawn.
@@ -70,29 +79,48 @@ impl Chart {
 
     /// Adds a curve: one value for each point of the abscissa. NaN leaves a gap.
     pub fn with_part(mut self, name: impl Into<String>, values: Vec<f64>) -> Chart {
-        self.parts.push((name.into(), values));
+        self.parts.push(Part { name: name.into(), values, band: None });
+        self
+    }
+
+    /// Adds a curve with a band around it, such as an interval of confidence: three values for each point of the abscissa.
+    /// Bands are drawn around lines, not around steps or areas.
+    pub fn with_banded_part(
+        mut self,
+        name: impl Into<String>,
+        values: Vec<f64>,
+        low: Vec<f64>,
+        high: Vec<f64>,
+    ) -> Chart {
+        self.parts.push(Part { name: name.into(), values, band: Some([low, high]) });
         self
     }
 
     /// Name and values of each curve.
     pub fn parts(&self) -> impl Iterator<Item = (&str, &[f64])> {
-        self.parts.iter().map(|(name, values)| (name.as_str(), values.as_slice()))
+        self.parts.iter().map(|part| (part.name.as_str(), part.values.as_slice()))
     }
 
     /// The data of the chart, with `start` subtracted from its abscissa.
     pub(super) fn data(&self, start: f64) -> Result<ChartData, ReportError> {
         let mut parts = Vec::with_capacity(self.parts.len());
-        for (name, values) in &self.parts {
-            if values.len() != self.x.len() {
-                return Err(ReportError::ChartLength {
+        for part in &self.parts {
+            let column = |values: &Vec<f64>| {
+                if values.len() == self.x.len() {
+                    return Ok(values.iter().map(|&value| Number::significant(value)).collect());
+                }
+                Err(ReportError::ChartLength {
                     chart: self.title.clone(),
-                    part: name.clone(),
+                    part: part.name.clone(),
                     found: values.len(),
                     expected: self.x.len(),
-                });
-            }
-            let y = values.iter().map(|&value| Number::significant(value)).collect();
-            parts.push(PartData { name: name.clone(), y });
+                })
+            };
+            let band = match &part.band {
+                Some([low, high]) => Some([column(low)?, column(high)?]),
+                None => None,
+            };
+            parts.push(PartData { name: part.name.clone(), y: column(&part.values)?, band });
         }
         Ok(ChartData {
             title: self.title.clone(),
@@ -120,6 +148,8 @@ pub(super) struct ChartData {
 struct PartData {
     name: String,
     y: Vec<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    band: Option<[Vec<Number>; 2]>,
 }
 
 #[cfg(test)]
@@ -133,6 +163,21 @@ mod tests {
         let json = serde_json::to_value(chart.data(1e9).unwrap()).unwrap();
         assert_eq!(json["x"], serde_json::json!([0, 0.5]));
         assert_eq!(json["parts"][0]["y"], serde_json::json!([1.5, null]));
+    }
+
+    #[test]
+    fn a_band_has_a_lower_and_an_upper_edge_for_each_point() {
+        let chart = |high: Vec<f64>| {
+            Chart::over("RMSE", "m", "Noise, m", vec![1.0, 2.0]).with_banded_part(
+                "ours",
+                vec![3.0, 4.0],
+                vec![2.5, 3.5],
+                high,
+            )
+        };
+        let json = serde_json::to_value(chart(vec![3.5, 4.5]).data(0.0).unwrap()).unwrap();
+        assert_eq!(json["parts"][0]["band"], serde_json::json!([[2.5, 3.5], [3.5, 4.5]]));
+        assert!(chart(vec![3.5]).data(0.0).unwrap_err().to_string().contains("1 values for 2 points"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Reports: one HTML file that shows what a tracker saw and made of it, and opens without a network.
 //!
 //! A [`Report`] is a title and a list of sections: a [`Summary`] of figures, a [`Picture`] (plan view with a time
-//! slider, tracks, truth, and charts that follow the slider) and free-standing [`Chart`]s.
+//! slider, tracks, truth, and charts that follow the slider), free-standing [`Chart`]s and [`Table`]s.
 //!
 //! ```
 //! use tercel_data::table::{Detections, Tracks};
@@ -24,6 +24,7 @@ mod chart;
 mod number;
 mod page;
 mod picture;
+mod table;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,7 @@ use tercel_data::AtomicFile;
 
 pub use chart::{Chart, Form};
 pub use picture::{Picture, SensorNote};
+pub use table::Table;
 
 /// A page of figures, pictures and charts.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,6 +52,8 @@ pub enum Section {
     Picture(Box<Picture>),
     /// A chart on its own: an error over a parameter, ...
     Chart(Chart),
+    /// A table of figures.
+    Table(Table),
 }
 
 /// Figures that a reader looks at first.
@@ -177,6 +181,12 @@ impl From<Summary> for Section {
 impl From<Picture> for Section {
     fn from(picture: Picture) -> Section {
         Section::Picture(Box::new(picture))
+    }
+}
+
+impl From<Table> for Section {
+    fn from(table: Table) -> Section {
+        Section::Table(table)
     }
 }
 

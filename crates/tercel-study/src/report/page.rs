@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::chart::ChartData;
 use super::picture::PictureData;
-use super::{Report, ReportError, Section, Summary};
+use super::{Report, ReportError, Section, Summary, Table};
 
 const PLOTLY: &str = include_str!("../../assets/plotly/plotly-basic-4.1.1.min.js");
 const PLOTLY_LICENSE: &str = include_str!("../../assets/plotly/LICENSE");
@@ -42,6 +42,7 @@ pub(super) fn render(report: &Report) -> Result<String, ReportError> {
     for section in &report.sections {
         match section {
             Section::Summary(summary) => push_summary(&mut body, summary),
+            Section::Table(table) => push_table(&mut body, table),
             Section::Picture(picture) => {
                 push_host(&mut body, "picture", data.len());
                 data.push(SectionData::Picture(Box::new(picture.data()?)));
@@ -110,6 +111,25 @@ fn push_summary(body: &mut String, summary: &Summary) {
         body.push_str(&format!("<div><dt>{name}</dt><dd class=\"value\">{value}</dd>{help}</div>\n"));
     }
     body.push_str("</dl>\n");
+}
+
+fn push_table(body: &mut String, table: &Table) {
+    let open = if table.folded { "" } else { " open" };
+    let note = table.note.as_ref().map(|note| format!("<p class=\"hint\">{}</p>\n", escape(note)));
+    let cells = |tag: &str, cells: &[String]| -> String {
+        cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect()
+    };
+    body.push_str(&format!(
+        "<details class=\"figures\"{open}>\n<summary>{}</summary>\n{}<div class=\"wide\">\n<table>\n\
+         <thead><tr>{}</tr></thead>\n<tbody>\n",
+        escape(&table.heading),
+        note.unwrap_or_default(),
+        cells("th", &table.columns),
+    ));
+    for row in &table.rows {
+        body.push_str(&format!("<tr>{}</tr>\n", cells("td", row)));
+    }
+    body.push_str("</tbody>\n</table>\n</div>\n</details>\n");
 }
 
 /// The empty element that a script fills from entry `index` of the data.

@@ -80,7 +80,8 @@ fn text_of_users_is_shown_and_never_run() {
     let page = Report::new(ATTACK)
         .with_subtitle(ATTACK)
         .with(Summary::new().with(ATTACK, ATTACK, Some(ATTACK)))
-        .with(picture.unwrap().with_chart(chart.clone()))
+        .with(Table::new(ATTACK, [ATTACK]).with_note(ATTACK).with_row([ATTACK]))
+        .with(picture.unwrap().with_track_name(1, ATTACK).with_chart(chart.clone()))
         .with(chart)
         .render()
         .unwrap();
@@ -90,6 +91,7 @@ fn text_of_users_is_shown_and_never_run() {
     let data = data_of(&page);
     assert_eq!(data[0]["sensors"][0]["name"], ATTACK);
     assert_eq!(data[0]["truths"][0]["name"], ATTACK);
+    assert_eq!(data[0]["tracks"][0]["name"], ATTACK);
     assert_eq!(data[1]["parts"][0]["name"], ATTACK);
 }
 
@@ -121,6 +123,16 @@ fn tracks_and_objects_are_counted_at_every_time() {
     assert_eq!(parts[0]["y"], serde_json::json!([1]));
     assert_eq!(parts[1]["y"], serde_json::json!([0]));
     assert_eq!(parts[2]["y"], serde_json::json!([1]));
+}
+
+#[test]
+fn a_table_has_a_cell_for_every_column() {
+    let table = Table::new("Errors", ["a", "b"]).with_row(["1"]).with_row(["2", "3", "4"]);
+    let page = Report::new("table").with(table.clone()).render().unwrap();
+    assert!(page.contains("<tr><td>1</td><td></td></tr>\n<tr><td>2</td><td>3</td></tr>"));
+    assert!(page.contains("<details class=\"figures\" open>"));
+    let folded = Report::new("table").with(table.folded()).render().unwrap();
+    assert!(folded.contains("<details class=\"figures\">"));
 }
 
 #[test]

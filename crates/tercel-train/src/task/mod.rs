@@ -2,6 +2,7 @@
 
 pub mod flights;
 pub mod kalman_net;
+pub mod neural_imm;
 
 use std::ops::ControlFlow;
 
@@ -11,7 +12,8 @@ use crate::recipe;
 use crate::trainer::{Progress, Run, Summary};
 
 /// The kinds of recipes.
-pub const KINDS: [&str; 1] = [<kalman_net::KalmanNetKind as recipe::Kind>::NAME];
+pub const KINDS: [&str; 2] =
+    [<kalman_net::KalmanNetKind as recipe::Kind>::NAME, <neural_imm::NeuralImmKind as recipe::Kind>::NAME];
 
 /// Trains what a recipe describes; its kind chooses the task.
 ///
@@ -25,6 +27,7 @@ pub fn train(
 ) -> Result<Summary, TrainError> {
     match recipe::kind(recipe)?.as_str() {
         "kalman-net" => kalman_net::train(recipe, run, observer),
+        "neural-imm" => neural_imm::train(recipe, run, observer),
         other => {
             Err(refused("kind", format!("{other:?}"), format!("there are the kinds {}", KINDS.join(", "))))
         }

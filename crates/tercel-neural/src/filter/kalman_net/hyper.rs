@@ -246,8 +246,9 @@ impl KalmanNetHyper {
             return Err("`features` is empty; expected some of f1, f2, f3, f4".into());
         }
         let sizes: &[(&str, usize)] = match &self.architecture {
-            Architecture::Stacked { input, hidden, layers, .. } => {
-                &[("input", *input), ("hidden", *hidden), ("layers", *layers)]
+            Architecture::Stacked { input, hidden, layers, head } => {
+                // Without a head its size is zero, which is no error.
+                &[("input", *input), ("hidden", *hidden), ("layers", *layers), ("head", (*head).max(1))]
             }
             Architecture::Branched { in_mult, out_mult } => {
                 if self.features != Feature::ALL {

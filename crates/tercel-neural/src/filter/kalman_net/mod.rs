@@ -5,8 +5,6 @@ mod features;
 mod hyper;
 mod network;
 mod stacked;
-#[cfg(test)]
-mod tests;
 
 use std::sync::Arc;
 

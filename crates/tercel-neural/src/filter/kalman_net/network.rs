@@ -18,10 +18,12 @@ pub struct GainNetwork {
     layers: Layers,
 }
 
+// There is one of these per model, so its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq)]
 enum Layers {
     Stacked(Stacked),
-    Branched(Box<Branched>),
+    Branched(Branched),
 }
 
 impl GainNetwork {
@@ -44,7 +46,7 @@ impl GainNetwork {
                 Layers::Stacked(Stacked::new(&mut weights, hyper.inputs(), sizes)?)
             }
             Architecture::Branched { in_mult, out_mult } => {
-                Layers::Branched(Box::new(Branched::new(&mut weights, &hyper, in_mult, out_mult)?))
+                Layers::Branched(Branched::new(&mut weights, &hyper, in_mult, out_mult)?)
             }
         };
         weights.finish()?;

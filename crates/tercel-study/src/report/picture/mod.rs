@@ -107,6 +107,15 @@ impl Picture {
         })
     }
 
+    /// Gives a track a name, which the page shows instead of its number. A number that no track has changes nothing.
+    pub fn with_track_name(mut self, track: u64, name: impl Into<String>) -> Picture {
+        let name = name.into();
+        for columns in self.tracks.iter_mut().filter(|columns| columns.is(track)) {
+            columns.set_name(name.clone());
+        }
+        self
+    }
+
     /// Adds a chart over the time of the recording. A line marks the time of the slider, and a click moves it.
     pub fn with_chart(mut self, chart: Chart) -> Picture {
         self.charts.push(chart);

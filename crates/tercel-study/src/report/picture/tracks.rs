@@ -12,6 +12,8 @@ use crate::report::number::{Id, Number};
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct TrackColumns {
     id: Id,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
     /// Time of the first report without the track; missing when it is there to the end.
     until: Number,
     /// Rows of the table that a detection updated, before any thinning.
@@ -39,6 +41,16 @@ pub(super) struct TrackColumns {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     modes: Vec<Vec<Number>>,
     detection: Vec<Option<Id>>,
+}
+
+impl TrackColumns {
+    pub(super) fn is(&self, track: u64) -> bool {
+        self.id == Id(track)
+    }
+
+    pub(super) fn set_name(&mut self, name: String) {
+        self.name = Some(name);
+    }
 }
 
 /// Splits the table into tracks, in the order of their numbers. `reports` are the times at which tracks were told.
@@ -94,6 +106,7 @@ fn columns(id: u64, mut life: Vec<&Track>, frame: &Frame<'_>) -> Result<TrackCol
     let until = frame.reports.get(frame.reports.partition_point(|&time| time <= last)).copied();
     Ok(TrackColumns {
         id: Id(id),
+        name: None,
         until: Number::optional(until.map(|until| until - start)),
         updates,
         peak: Number::milli(peak),

@@ -1,0 +1,60 @@
+//! No learned filter allocates memory in a step once it has warmed up.
+
+#![allow(clippy::unwrap_used)]
+
+mod untrained;
+
+use allocation_counter::measure;
+use tercel_core::filter::Filter;
+use tercel_core::motion::ConstantVelocity;
+use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
+use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm, NeuralImmHyper};
+use untrained::{TINY_ONE, network, tiny};
+
+/// Allocations in 100 steps after ten, in their comparisons and states, and in copies over a belief of the same sizes.
+fn allocations<F: Filter<4, Measurement = Measurement<2>>>(filter: &F) -> u64 {
+    let seen: Measurement<2> = [10_000.0, 0.5].into();
+    let mut belief = filter.birth(&seen).unwrap();
+    let mut copy = belief.clone();
+    let mut step = || {
+        filter.predict(&mut belief, 1.0);
+        filter.innovation(&belief, &seen).unwrap();
+        filter.update(&mut belief, &seen).unwrap();
+        copy.clone_from(&belief);
+        filter.merge(&mut copy, 0.5, &belief, 0.5);
+        filter.reach(&belief);
+        filter.state(&belief)
+    };
+    (0..10).for_each(|_| {
+        step();
+    });
+    measure(|| (0..100).for_each(|_| assert!(step().mean[0].is_finite()))).count_total
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(measure(|| drop(std::hint::black_box(vec![1_u8]))).count_total, 1);
+}
+
+#[test]
+fn kalman_nets_do_not_allocate() {
+    let hypers = [
+        KalmanNetHyper::paper(Architecture::one()),
+        KalmanNetHyper::paper(Architecture::two()),
+        tiny(TINY_ONE, Covariance::Joseph),
+        tiny(Architecture::two(), Covariance::Joseph),
+    ];
+    for hyper in hypers {
+        let radar = ConvertedPolar::new(50.0, 0.005).unwrap();
+        let filter = KalmanNet::new(network(&hyper, 0.1), ConstantVelocity::new(1.0), radar);
+        assert_eq!(allocations(&filter), 0, "{hyper:?}");
+    }
+}
+
+#[test]
+fn neural_imms_do_not_allocate() {
+    let network = untrained::neural_imm(&NeuralImmHyper::default(), 0.1, 1);
+    let radars = [0.003, 0.01].map(|bearing| RangeBearing::new(50.0, bearing).unwrap());
+    assert_eq!(allocations(&NeuralImm::new(network.clone(), &radars).unwrap()), 0);
+    assert_eq!(allocations(&NeuralImm::new(network, &radars[..1]).unwrap()), 0);
+}

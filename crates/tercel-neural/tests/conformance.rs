@@ -1,0 +1,61 @@
+//! Learned filters keep the promises of every filter.
+
+mod untrained;
+
+use tercel_core::conformance;
+use tercel_core::conformance::{Expectations, Problem, positions};
+use tercel_core::filter::{Imm, Transition};
+use tercel_core::motion::ConstantVelocity;
+use tercel_core::sensor::Position;
+use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm};
+use untrained::{TINY_ONE, TINY_TWO, network, tiny};
+
+fn net(hyper: &KalmanNetHyper, problem: &Problem) -> KalmanNet<ConstantVelocity, Position<2>> {
+    KalmanNet::new(network(hyper, 0.05), problem.motion(), problem.sensor())
+}
+
+/// A gain for steps of a second makes no sense for steps of a quarter of an hour, and this covariance says so.
+const ORDINARY_TIMES: Expectations = Expectations { extremes: false, ..Expectations::own_models() };
+
+conformance!(
+    kalman_net_one,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| net(&tiny(TINY_ONE, Covariance::Riccati), p))
+);
+conformance!(
+    kalman_net_two,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| net(&tiny(TINY_TWO, Covariance::Riccati), p))
+);
+// The covariance of the publication does not depend on the network: the smallest one shows that it survives.
+conformance!(
+    kalman_net_at_extreme_noises,
+    positions::<4, _, _>(Expectations::own_models(), |p| {
+        let smallest = Architecture::Stacked { input: 1, hidden: 1, layers: 1, head: 0 };
+        let gain_offset = Some(untrained::ALPHA_BETA);
+        net(&KalmanNetHyper { gain_offset, ..KalmanNetHyper::paper(smallest) }, p)
+    })
+);
+conformance!(
+    kalman_net_with_the_covariance_of_its_gain,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| net(&tiny(TINY_TWO, Covariance::Joseph), p))
+);
+conformance!(
+    kalman_net_of_the_publication,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let gain_offset = Some(untrained::ALPHA_BETA);
+        net(&KalmanNetHyper { gain_offset, ..KalmanNetHyper::paper(Architecture::two()) }, p)
+    })
+);
+conformance!(
+    imm_of_kalman_nets,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let modes = [TINY_ONE, TINY_TWO].map(|a| net(&tiny(a, Covariance::Joseph), p));
+        Imm::new(modes, Transition::sticky(0.95)).unwrap()
+    })
+);
+// Its bank merges to the moments of the two; what the network adds to the merged bank is not the mean of what it added.
+conformance!(
+    neural_imm,
+    positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
+        NeuralImm::new(untrained::neural_imm(&untrained::small_bank(), 0.3, 1), &[p.sensor()]).unwrap()
+    })
+);

@@ -1,0 +1,80 @@
+//! Models with random weights, for tests and benchmarks that need none in particular.
+
+#![allow(dead_code, clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tercel_neural::filter::{
+    Architecture, BankNetwork, Covariance, Feature, GainNetwork, KalmanNetHyper, NeuralImmHyper,
+};
+use tercel_neural::{Card, Model, Tensor};
+
+/// The state of all filters here.
+pub const STATE: [&str; 4] = ["x", "y", "vx", "vy"];
+
+/// Gains of an alpha-beta filter for the objects of the conformance suite.
+pub const ALPHA_BETA: [[f32; 2]; 4] = [[0.4, 0.0], [0.0, 0.4], [0.1, 0.0], [0.0, 0.1]];
+
+/// Weights that are uniform within `size`, times the inverse root of what each output sums.
+fn weights(tensors: Vec<(String, Vec<usize>)>, size: f32, seed: u64) -> BTreeMap<String, Tensor> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut tensor = |(name, shape): (String, Vec<usize>)| {
+        let count: usize = shape.iter().product();
+        let bound = size / (shape[0] as f32).sqrt();
+        let values = (0..count).map(|_| bound * (2.0 * random.random::<f32>() - 1.0)).collect();
+        (name, Tensor { shape, values })
+    };
+    tensors.into_iter().map(&mut tensor).collect()
+}
+
+/// A KalmanNet with random weights.
+pub fn kalman_net(hyper: &KalmanNetHyper, size: f32, seed: u64) -> Model {
+    let mut card = Card::new("untrained", "kalman-net", &STATE);
+    card.hyper = hyper.to_table().unwrap();
+    card.scales = KalmanNetHyper::default_scales();
+    Model::new(card, weights(hyper.tensors(), size, seed)).unwrap()
+}
+
+/// A neural IMM with random weights.
+pub fn neural_imm(hyper: &NeuralImmHyper, size: f32, seed: u64) -> Arc<BankNetwork> {
+    let mut card = Card::new("untrained", "neural-imm", &STATE);
+    card.hyper = hyper.to_table().unwrap();
+    Arc::new(
+        BankNetwork::from_model(&Model::new(card, weights(hyper.tensors(), size, seed)).unwrap()).unwrap(),
+    )
+}
+
+/// A small bank for slow objects.
+pub fn small_bank() -> NeuralImmHyper {
+    NeuralImmHyper {
+        rates: vec![0.0, 0.05, -0.05],
+        accelerations: vec![0.5, 2.0],
+        speed: 20.0,
+        input: 6,
+        hidden: 5,
+        layers: 2,
+        ..NeuralImmHyper::default()
+    }
+}
+
+pub fn network(hyper: &KalmanNetHyper, size: f32) -> Arc<GainNetwork> {
+    Arc::new(GainNetwork::from_model(&kalman_net(hyper, size, 1)).unwrap())
+}
+
+/// Small networks with everything that differs from the publication, beside an alpha-beta filter.
+pub fn tiny(architecture: Architecture, covariance: Covariance) -> KalmanNetHyper {
+    KalmanNetHyper {
+        features: Feature::ALL.to_vec(),
+        magnitudes: true,
+        sensor_frame: true,
+        covariance,
+        gain_offset: Some(ALPHA_BETA),
+        ..KalmanNetHyper::paper(architecture)
+    }
+}
+
+pub const TINY_ONE: Architecture = Architecture::Stacked { input: 12, hidden: 9, layers: 2, head: 5 };
+pub const TINY_TWO: Architecture = Architecture::Branched { in_mult: 2, out_mult: 3 };

@@ -1,0 +1,106 @@
+//! What was published about these flights.
+
+use std::collections::BTreeMap;
+
+/// The published row of a method: mean and standard deviation over the flights of a set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PublishedFigures {
+    /// Name of the method here, with the suffix `-paper` where our default differs from the publication by design.
+    pub method: &'static str,
+    /// Population of the flights.
+    pub set: &'static str,
+    /// Mean and deviation of the element error over all components.
+    pub rmse_all: (f64, f64),
+    /// Mean and deviation of the element error over the positions, m.
+    pub rmse_pos: (f64, f64),
+    /// Mean and deviation of the element error over the velocities, m/s.
+    pub rmse_vel: (f64, f64),
+    /// Mean and deviation of the accuracy, percent, where the method tells manoeuvres.
+    pub accuracy: Option<(f64, f64)>,
+}
+
+const fn row(
+    method: &'static str,
+    set: &'static str,
+    figures: [(f64, f64); 3],
+    accuracy: Option<(f64, f64)>,
+) -> PublishedFigures {
+    let [rmse_all, rmse_pos, rmse_vel] = figures;
+    PublishedFigures { method, set, rmse_all, rmse_pos, rmse_vel, accuracy }
+}
+
+/// Tables 3 (`atc-test`) and 5 (`atc-hshm`) of the AttEnsKNets paper.
+pub const PUBLISHED: [PublishedFigures; 10] = [
+    row(
+        "imm-paper",
+        "atc-test",
+        [(397.92, 271.54), (505.94, 336.87), (244.75, 186.53)],
+        Some((40.61, 19.70)),
+    ),
+    row("mnemonic-kf", "atc-test", [(507.24, 294.53), (685.85, 434.06), (157.01, 68.10)], None),
+    row("deepmtt", "atc-test", [(255.59, 231.74), (356.30, 326.96), (57.53, 29.82)], None),
+    row("trmtt", "atc-test", [(251.39, 145.95), (345.63, 208.38), (72.97, 28.07)], None),
+    row(
+        "att-ens-kalmannets",
+        "atc-test",
+        [(187.18, 96.93), (258.18, 137.24), (54.19, 20.86)],
+        Some((81.99, 14.42)),
+    ),
+    row(
+        "imm-paper",
+        "atc-hshm",
+        [(471.18, 322.29), (576.85, 391.69), (332.32, 234.81)],
+        Some((46.71, 18.95)),
+    ),
+    row("mnemonic-kf", "atc-hshm", [(595.47, 304.13), (735.37, 482.87), (344.08, 43.30)], None),
+    row("deepmtt", "atc-hshm", [(573.12, 376.52), (789.42, 433.60), (170.25, 65.88)], None),
+    row("trmtt", "atc-hshm", [(404.25, 184.67), (521.23, 271.03), (218.13, 48.38)], None),
+    row(
+        "att-ens-kalmannets",
+        "atc-hshm",
+        [(328.98, 143.28), (426.41, 193.15), (175.54, 87.05)],
+        Some((75.06, 15.14)),
+    ),
+];
+
+impl PublishedFigures {
+    /// The row of a method on a set. A learned method is compared with its publication with and without the suffix `-paper`.
+    pub fn of(method: &str, set: &str) -> Option<&'static PublishedFigures> {
+        let is_method = |row: &&PublishedFigures| {
+            row.method == method || method.strip_suffix("-paper") == Some(row.method)
+        };
+        PUBLISHED.iter().filter(|row| row.set == set).find(is_method)
+    }
+
+    /// The means by the name of the metric.
+    pub fn means(&self) -> BTreeMap<String, f64> {
+        let all = [
+            ("rmse_all", Some(self.rmse_all)),
+            ("rmse_pos", Some(self.rmse_pos)),
+            ("rmse_vel", Some(self.rmse_vel)),
+            ("accuracy", self.accuracy),
+        ];
+        all.into_iter().filter_map(|(name, figure)| Some((name.to_owned(), figure?.0))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_element_errors_of_each_row_fit_each_other() {
+        // Mean of roots against root of means: a slip of a digit would show, and so would Euclidean figures.
+        for row in PUBLISHED {
+            let mean = ((row.rmse_pos.0.powi(2) + row.rmse_vel.0.powi(2)) / 2.0).sqrt();
+            assert!((row.rmse_all.0 / mean - 1.0).abs() < 0.04, "{row:?}: {mean}");
+        }
+    }
+
+    #[test]
+    fn our_default_is_not_the_published_imm() {
+        assert_eq!(PublishedFigures::of("imm-paper", "atc-hshm").unwrap().rmse_all.0, 471.18);
+        assert!(PublishedFigures::of("imm", "atc-test").is_none());
+        assert!(PublishedFigures::of("deepmtt-paper", "atc-test").is_some());
+    }
+}

@@ -1,0 +1,282 @@
+//! The studies by name.
+
+use crate::air_traffic::{self, AirTrafficExperiment};
+use crate::autoferry;
+use crate::error::StudyError;
+use crate::monte_carlo::{Experiment, Plan};
+
+/// A study that can be run by its name.
+///
+/// ```
+/// use tercel_study::studies::{Choice, Study};
+///
+/// let study = Study::find("atc-test")?;
+/// let choice = Choice { runs: Some(20), methods: Some(vec!["measurement".into()]), ..Choice::default() };
+/// assert_eq!(study.experiment(&choice)?.plan().runs, 20);
+/// # Ok::<(), tercel_study::StudyError>(())
+/// ```
+#[derive(Debug)]
+pub struct Study {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is about, in half a sentence.
+    pub about: &'static str,
+    /// The methods that it compares, in the order in which they are best read.
+    pub methods: &'static [&'static str],
+    /// Whether its scenes are recordings or are drawn.
+    pub kind: Kind,
+}
+
+/// Where the scenes of a study come from.
+#[derive(Debug)]
+pub enum Kind {
+    /// From recordings: there is a folder of data, and nothing is drawn.
+    Recordings,
+    /// From a seed.
+    MonteCarlo(MonteCarlo),
+}
+
+/// A study whose scenes are drawn.
+#[derive(Debug)]
+pub struct MonteCarlo {
+    /// The seed unless another is chosen.
+    pub seed: u64,
+    /// The number of runs unless another is chosen.
+    pub runs: u64,
+    /// The sets of scenes among which can be chosen, the default first; none when there is nothing to choose.
+    pub sets: &'static [&'static str],
+    build: fn(&Request<'_>) -> Result<AirTrafficExperiment, StudyError>,
+}
+
+/// What may be chosen about a study whose scenes are drawn; what is not chosen is as the study has it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Choice {
+    /// Seed of the random numbers.
+    pub seed: Option<u64>,
+    /// Number of runs.
+    pub runs: Option<u64>,
+    /// Names of methods.
+    pub methods: Option<Vec<String>>,
+    /// Name of a set of scenes.
+    pub set: Option<String>,
+}
+
+/// A choice that was made.
+struct Request<'a> {
+    set: &'a str,
+    seed: u64,
+    runs: u64,
+    methods: &'a [String],
+}
+
+impl Request<'_> {
+    /// The population of flights of this set.
+    fn flights(&self) -> &'static str {
+        if self.set == "hshm" { "atc-hshm" } else { "atc-test" }
+    }
+}
+
+/// All studies.
+pub const STUDIES: [Study; 5] = [
+    Study {
+        name: "atc-test",
+        about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
+        methods: &air_traffic::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: air_traffic::SEED,
+            runs: 1000,
+            sets: &[],
+            build: |r| AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods),
+        }),
+    },
+    Study {
+        name: "atc-hshm",
+        about: "the same at high speed with hard turns, outside what was trained on (Table 5)",
+        methods: &air_traffic::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: air_traffic::SEED,
+            runs: 1000,
+            sets: &[],
+            build: |r| AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods),
+        }),
+    },
+    Study {
+        name: "atc-noise",
+        about: "errors over the bearing noise of the radar, 0.1 to 1 degrees",
+        methods: &air_traffic::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: air_traffic::SEED,
+            runs: 200,
+            sets: &["test", "hshm"],
+            build: |r| AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods),
+        }),
+    },
+    Study {
+        name: "atc-missing",
+        about: "errors over the detection probability of the radar, 1 to 0.65",
+        methods: &air_traffic::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: air_traffic::SEED,
+            runs: 200,
+            sets: &["test", "hshm"],
+            build: |r| AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods),
+        }),
+    },
+    Study {
+        name: autoferry::NAME,
+        about: "radar and lidar of a small ferry against the GNSS truth of two boats",
+        methods: &autoferry::METHODS,
+        kind: Kind::Recordings,
+    },
+];
+
+impl Study {
+    /// The study of that name.
+    ///
+    /// # Errors
+    /// When there is none; the message lists all, and the one that may have been meant.
+    pub fn find(name: &str) -> Result<&'static Study, StudyError> {
+        static ALL: &[Study] = &STUDIES;
+        ALL.iter().find(|study| study.name == name).ok_or_else(|| {
+            let names = STUDIES.map(|study| study.name);
+            StudyError::Unknown { name: name.to_owned(), known: listed(name, &names) }
+        })
+    }
+
+    /// The chosen methods, or all.
+    ///
+    /// # Errors
+    /// When the study has no such method, or one is chosen twice.
+    pub fn methods(&self, chosen: Option<&[String]>) -> Result<Vec<String>, StudyError> {
+        let all = || self.methods.iter().map(|name| (*name).to_owned()).collect();
+        let methods: Vec<String> = chosen.map_or_else(all, <[String]>::to_vec);
+        for (place, name) in methods.iter().enumerate() {
+            if !self.methods.contains(&name.as_str()) {
+                let known = listed(name, self.methods);
+                return Err(StudyError::UnknownMethod { study: self.name, name: name.clone(), known });
+            }
+            if methods[..place].contains(name) {
+                return Err(StudyError::Option(format!("the method `{name}` is named twice")));
+            }
+        }
+        Ok(methods)
+    }
+
+    /// The experiment of a study whose scenes are drawn.
+    ///
+    /// # Errors
+    /// When the study does not have what was chosen, or its scenes are not drawn.
+    pub fn experiment(&self, choice: &Choice) -> Result<Box<dyn Experiment>, StudyError> {
+        let refused = |problem: String| Err(StudyError::Option(problem));
+        let Kind::MonteCarlo(study) = &self.kind else {
+            return refused(format!("the study {} has recordings: no runs can be drawn", self.name));
+        };
+        let methods = self.methods(choice.methods.as_deref())?;
+        let set = match (choice.set.as_deref(), study.sets) {
+            (None, sets) => sets.first().copied().unwrap_or_default(),
+            (Some(_), []) => {
+                return refused(format!("the study {} takes no --set: it has one set of scenes", self.name));
+            }
+            (Some(set), sets) if sets.contains(&set) => set,
+            (Some(set), sets) => {
+                let known = sets.join(", ");
+                return refused(format!("the study {} has no set `{set}`; its sets are: {known}", self.name));
+            }
+        };
+        let runs = choice.runs.unwrap_or(study.runs);
+        if !(1..=1 << 32).contains(&runs) {
+            return refused(format!("a study cannot have {runs} runs; expected 1 to {}", 1_u64 << 32));
+        }
+        let seed = choice.seed.unwrap_or(study.seed);
+        let request = Request { set, seed, runs, methods: &methods };
+        Ok(Box::new((study.build)(&request)?))
+    }
+}
+
+/// The experiment that a plan describes.
+///
+/// # Errors
+/// When this version of the program would not follow exactly this plan.
+pub fn experiment_of(plan: &Plan) -> Result<Box<dyn Experiment>, StudyError> {
+    let choice = Choice {
+        seed: Some(plan.seed),
+        runs: Some(plan.runs),
+        methods: Some(plan.methods.clone()),
+        set: plan.options.get("set").cloned(),
+    };
+    let experiment = Study::find(&plan.study)?.experiment(&choice)?;
+    if experiment.plan() == plan {
+        return Ok(experiment);
+    }
+    let problem = format!("the plan of the study {} is not the one that this program has", plan.study);
+    Err(StudyError::Option(problem))
+}
+
+/// Names with commas between them, and the one that may have been meant.
+fn listed(name: &str, known: &[&str]) -> String {
+    let nearest = known.iter().map(|other| (changes(name, other), other)).min();
+    let meant = nearest.filter(|(changes, other)| *changes <= 2 && *changes < other.len());
+    let help = meant.map(|(_, other)| format!("\n  help: did you mean `{other}`?"));
+    known.join(", ") + &help.unwrap_or_default()
+}
+
+/// How many letters must be changed, added or taken away to make one word of the other (Levenshtein).
+fn changes(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, letter) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for j in 0..b.len() {
+            let replaced = diagonal + usize::from(letter != b[j]);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(choice: &Choice, name: &str) -> String {
+        Study::find(name).unwrap().experiment(choice).err().unwrap().to_string()
+    }
+
+    #[test]
+    fn an_unknown_study_or_method_lists_the_known_ones_and_guesses_what_was_meant() {
+        let error = Study::find("atc-tset").unwrap_err().to_string();
+        assert!(
+            error.contains("atc-hshm, atc-noise") && error.contains("did you mean `atc-test`"),
+            "{error}"
+        );
+        assert!(!Study::find("magic").unwrap_err().to_string().contains("did you mean"));
+        let methods = Some(vec!["mesurement".to_owned()]);
+        let error = message(&Choice { methods, ..Choice::default() }, "atc-test");
+        assert!(error.contains("did you mean `measurement`"), "{error}");
+    }
+
+    #[test]
+    fn what_a_study_does_not_have_is_refused() {
+        let set = |set: &str| Choice { set: Some(set.to_owned()), ..Choice::default() };
+        assert!(message(&set("test"), "atc-test").contains("takes no --set"));
+        assert!(message(&set("slow"), "atc-noise").contains("test, hshm"));
+        assert!(message(&Choice { runs: Some(0), ..Choice::default() }, "atc-test").contains("0 runs"));
+        let twice = Some(vec!["measurement".to_owned(); 2]);
+        assert!(message(&Choice { methods: twice, ..Choice::default() }, "atc-test").contains("twice"));
+        assert!(message(&Choice::default(), "autoferry").contains("recordings"));
+    }
+
+    #[test]
+    fn a_plan_gives_its_experiment_back() {
+        for name in ["atc-test", "atc-hshm", "atc-noise", "atc-missing"] {
+            let choice = Choice { runs: Some(3), seed: Some(u64::MAX), ..Choice::default() };
+            let plan = Study::find(name).unwrap().experiment(&choice).unwrap().plan().clone();
+            assert_eq!(experiment_of(&plan).unwrap().plan(), &plan);
+            let mut other = plan.clone();
+            other.metrics.pop();
+            assert!(experiment_of(&other).is_err());
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Flights as a bank of filters followed them: what the network sees, and what it should make of it.
+
+use nalgebra::{Matrix2, Vector2, Vector4};
+use rand::RngExt;
+use serde::Deserialize;
+use tercel_core::error::FilterError;
+use tercel_core::filter::Filter;
+use tercel_core::sensor::{Measurement, RangeBearing};
+use tercel_neural::filter::{NeuralImm, NeuralImmBelief};
+use tercel_sim::air_traffic::{AirTraffic, Flight, Radar};
+use tercel_sim::{Interval, SimulationError};
+
+use crate::TrainError;
+use crate::check::{refused, size};
+use crate::trainer::{Draw, Split};
+
+/// The section `[data]`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BankDataConfig {
+    /// Training flights in an epoch. Each epoch has flights of its own.
+    pub training: usize,
+    /// Validation flights.
+    pub validation: usize,
+    /// Steps of a flight, with the first.
+    pub steps: usize,
+    /// From which flights are drawn, in turns.
+    pub population: Vec<Population>,
+    /// Share of flights whose radar is seen at each step.
+    pub unbroken: f64,
+    /// The range from which the others draw their detection probability.
+    pub detection: [f64; 2],
+    /// Share of flights whose radar states its accuracy.
+    pub stated: f64,
+    /// The bearing accuracies among which the bank chooses for the others, degrees.
+    pub bearings: Vec<f64>,
+    /// The range accuracy that goes with them, m.
+    pub range: f64,
+}
+
+impl Default for BankDataConfig {
+    fn default() -> Self {
+        Self {
+            training: 12_800,
+            validation: 1_024,
+            steps: 200,
+            population: vec![Population::default()],
+            unbroken: 0.5,
+            detection: [0.6, 1.0],
+            stated: 0.7,
+            bearings: vec![0.15, 0.4, 0.7, 1.0],
+            range: 50.0,
+        }
+    }
+}
+
+/// A population of simulated flights: [`AirTraffic`] with other numbers.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Population {
+    /// Fewest and most switches between manoeuvres.
+    pub switches: [usize; 2],
+    /// Slowest and fastest turns, degrees a second.
+    pub turn_rate: [f64; 2],
+    /// Smallest and largest deviation of the acceleration, m/s².
+    pub acceleration: [f64; 2],
+    /// Lowest and highest first speed, m/s.
+    pub speed: [f64; 2],
+    /// Nearest and farthest start, m.
+    pub distance: [f64; 2],
+}
+
+impl Default for Population {
+    fn default() -> Self {
+        Self {
+            switches: [1, 6],
+            turn_rate: [0.0, 20.0],
+            acceleration: [5.0, 20.0],
+            speed: [50.0, 600.0],
+            distance: [50e3, 150e3],
+        }
+    }
+}
+
+impl Population {
+    fn scenario(&self, steps: usize) -> Result<AirTraffic, SimulationError> {
+        let interval = |[low, high]: [f64; 2]| Interval::new(low, high);
+        AirTraffic::training()
+            .with_steps(steps)?
+            .with_switches(self.switches[0]..=self.switches[1])?
+            .with_turn_rates(interval(self.turn_rate.map(f64::to_radians))?)?
+            .with_acceleration(interval(self.acceleration)?)?
+            .with_speed(interval(self.speed)?)?
+            .with_distance(interval(self.distance)?)
+    }
+}
+
+/// Where flights come from, and the filters that follow them.
+#[derive(Debug)]
+pub(super) struct BankData {
+    config: BankDataConfig,
+    populations: Vec<AirTraffic>,
+    stated: NeuralImm<RangeBearing>,
+    estimating: NeuralImm<RangeBearing>,
+    seed: u64,
+}
+
+/// Keeps the flights of trainings apart from those of studies, whose seeds are small numbers.
+const TRAINING: u64 = 0x6261_6e6b_0000_0000;
+const VALIDATION: u64 = 0x6261_6e6c_0000_0000;
+
+impl BankData {
+    /// The data of a recipe; `filter` makes the filter for some sensors, of which only the bank is used.
+    pub fn new(
+        config: &BankDataConfig,
+        seed: u64,
+        filter: impl Fn(&[RangeBearing]) -> Result<NeuralImm<RangeBearing>, FilterError>,
+    ) -> Result<Self, TrainError> {
+        size("data.training", config.training, [1, 100_000_000])?;
+        size("data.validation", config.validation, [1, 100_000_000])?;
+        size("data.steps", config.steps, [super::SKIP + 2, 1_000_000])?;
+        let [low, high] = config.detection;
+        if !(0.0 < low && low <= high && high <= 1.0) {
+            let value = format!("[{low}, {high}]");
+            return Err(refused("data.detection", value, "it must be a range above 0 and up to 1"));
+        }
+        for (key, share) in [("data.unbroken", config.unbroken), ("data.stated", config.stated)] {
+            if !(0.0..=1.0).contains(&share) {
+                return Err(refused(key, share, "it is a share, between 0 and 1"));
+            }
+        }
+        if config.population.is_empty() {
+            return Err(refused("data.population", "[]", "there must be at least one"));
+        }
+        let scenario = |population: &Population| {
+            let fault = |error| TrainError::Recipe(format!("[[data.population]]: {error}"));
+            population.scenario(config.steps).map_err(fault)
+        };
+        let fault = |error: FilterError| TrainError::Recipe(format!("[data] or [model]: {error}"));
+        let radar = |degrees: &f64| RangeBearing::new(config.range, degrees.to_radians());
+        let radars: Result<Vec<_>, _> = config.bearings.iter().map(radar).collect();
+        let radars = radars.map_err(fault)?;
+        let first =
+            radars.first().ok_or_else(|| refused("data.bearings", "[]", "there must be at least one"))?;
+        Ok(Self {
+            populations: config.population.iter().map(scenario).collect::<Result<_, _>>()?,
+            stated: filter(std::slice::from_ref(first)).map_err(fault)?,
+            estimating: filter(&radars).map_err(fault)?,
+            config: config.clone(),
+            seed,
+        })
+    }
+
+    pub fn samples(&self, split: Split) -> usize {
+        match split {
+            Split::Training => self.config.training,
+            Split::Validation => self.config.validation,
+        }
+    }
+
+    /// The flights of a draw, followed by the bank.
+    pub fn batch(&self, draw: Draw<'_>) -> Result<Followed, TrainError> {
+        let hyper = self.stated.network().hyper();
+        let mut followed = Followed::new(draw.samples.len(), self.config.steps, hyper.inputs());
+        for (member, sample) in draw.samples.iter().enumerate() {
+            self.follow(draw, *sample, member, &mut followed).map_err(|error| match error {
+                TrainError::Data(reason) => TrainError::Data(format!("flight {sample}: {reason}")),
+                other => other,
+            })?;
+        }
+        Ok(followed)
+    }
+
+    fn follow(
+        &self,
+        draw: Draw<'_>,
+        sample: u64,
+        member: usize,
+        followed: &mut Followed,
+    ) -> Result<(), TrainError> {
+        let fault = |error: &dyn std::fmt::Display| TrainError::Data(error.to_string());
+        let (seed, run) = match draw.split {
+            Split::Training => (TRAINING, draw.epoch as u64 * self.config.training as u64 + sample),
+            Split::Validation => (VALIDATION, sample),
+        };
+        let seed = seed ^ self.seed;
+        let flight = self.populations[(sample % self.populations.len() as u64) as usize].flight(seed, run);
+        let mut random = draw.random(sample);
+        let [low, high] = self.config.detection;
+        let drawn = low + (high - low) * random.random::<f64>();
+        let detection = if random.random::<f64>() < self.config.unbroken { 1.0 } else { drawn };
+        let stated = random.random::<f64>() < self.config.stated;
+        let radar = flight.radar().with_detection(detection).map_err(|error| fault(&error))?;
+        let plots = flight.observe(&radar, seed, run);
+        let filter = if stated { &self.stated } else { &self.estimating };
+        let measure = |plot: &Vector2<f64>| measurement(plot, stated.then_some(&radar));
+        let (first, rest) = plots.split_first().ok_or_else(|| fault(&"it has no steps"))?;
+        let first = first.as_ref().ok_or_else(|| fault(&"its first step was not seen"))?;
+        let mut belief = filter.birth(&measure(first)).map_err(|error| fault(&error))?;
+        let mut updates = 0;
+        for (step, plot) in rest.iter().enumerate() {
+            filter.predict(&mut belief, flight.interval());
+            if let Some(plot) = plot {
+                filter.update(&mut belief, &measure(plot)).map_err(|error| fault(&error))?;
+                followed.see(member, updates, belief.inputs());
+                updates += 1;
+            }
+            if step + 1 >= super::SKIP && updates > 0 {
+                followed.expect(member, updates - 1, &belief, &flight, step + 1, filter.bank().rates());
+            }
+        }
+        Ok(())
+    }
+}
+
+fn measurement(plot: &Vector2<f64>, radar: Option<&Radar>) -> Measurement<2> {
+    let measurement = Measurement::from(*plot);
+    match radar {
+        None => measurement,
+        Some(radar) => {
+            let variances = Vector2::new(radar.range() * radar.range(), radar.bearing() * radar.bearing());
+            measurement.with_noise(Matrix2::from_diagonal(&variances))
+        }
+    }
+}
+
+/// A batch of flights.
+#[derive(Debug)]
+pub(super) struct Followed {
+    pub members: usize,
+    /// Most measurements of a flight after the first.
+    pub updates: usize,
+    width: usize,
+    /// Inputs of the network, row `update * members + member`; zero after the last measurement of a flight.
+    pub inputs: Vec<f32>,
+    /// The instants that count.
+    pub instants: Vec<Instant>,
+    /// For each instant, the turn rates one after the other.
+    pub ln_probabilities: Vec<f32>,
+    pub offsets: Vec<[f32; 4]>,
+    pub directions: Vec<u8>,
+}
+
+/// One instant of one flight.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Instant {
+    pub member: usize,
+    /// The row of the last network step before it or at it.
+    pub row: usize,
+    /// What is to be added to the mean of the bank, in the frame of the line of sight.
+    pub target: [f32; 4],
+    /// Lower Cholesky factor of the bank's covariance in that frame, row by row.
+    pub root: [[f32; 4]; 4],
+    /// What the aircraft does: 0 straight, 1 left, 2 right.
+    pub manoeuvre: u8,
+}
+
+impl Followed {
+    fn new(members: usize, steps: usize, width: usize) -> Self {
+        let updates = steps - 1;
+        Self {
+            members,
+            updates,
+            width,
+            inputs: vec![0.0; members * updates * width],
+            instants: Vec::with_capacity(members * updates),
+            ln_probabilities: Vec::new(),
+            offsets: Vec::new(),
+            directions: Vec::new(),
+        }
+    }
+
+    /// Width of an input row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    fn see(&mut self, member: usize, update: usize, inputs: &[f32]) {
+        let row = update * self.members + member;
+        self.inputs[row * self.width..][..self.width].copy_from_slice(inputs);
+    }
+
+    fn expect(
+        &mut self,
+        member: usize,
+        update: usize,
+        belief: &NeuralImmBelief,
+        flight: &Flight,
+        step: usize,
+        rates: &[f64],
+    ) {
+        let outlook = belief.outlook();
+        let four = |v: &Vector4<f64>| -> [f32; 4] { std::array::from_fn(|i| v[i] as f32) };
+        let target = outlook.turned(&(flight.states()[step] - outlook.state().mean));
+        let root = outlook.root();
+        self.instants.push(Instant {
+            member,
+            row: update * self.members + member,
+            target: four(&target),
+            root: std::array::from_fn(|i| std::array::from_fn(|j| root[(i, j)] as f32)),
+            manoeuvre: flight.manoeuvres()[step].index() as u8,
+        });
+        self.ln_probabilities.extend(outlook.probabilities().iter().map(|p| p.ln() as f32));
+        self.offsets.extend(outlook.offsets().iter().map(four));
+        if self.directions.is_empty() {
+            let direction = |rate: &f64| if *rate == 0.0 { 0 } else { 1 + u8::from(*rate < 0.0) };
+            self.directions = rates.iter().map(direction).collect();
+        }
+    }
+}
