@@ -8,7 +8,8 @@ use std::sync::Arc;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tercel_neural::filter::{
-    Architecture, BankNetwork, Covariance, Feature, GainNetwork, KalmanNetHyper, NeuralImmHyper,
+    Architecture, Attention, BankNetwork, BranchHyper, Covariance, EnsKNetsHyper, EnsembleNetwork, Feature,
+    GainNetwork, KalmanNetHyper, NeuralImmHyper, Normalisation, Sign,
 };
 use tercel_neural::{Card, Model, Tensor};
 
@@ -57,6 +58,45 @@ pub fn small_bank() -> NeuralImmHyper {
         hidden: 5,
         layers: 2,
         ..NeuralImmHyper::default()
+    }
+}
+
+/// An ensemble with random weights.
+pub fn ensemble_model(hyper: &EnsKNetsHyper, size: f32, seed: u64) -> Model {
+    let mut card = Card::new("untrained", "ens-knets", &STATE);
+    card.hyper = hyper.to_table().unwrap();
+    card.scales = EnsKNetsHyper::default_scales();
+    for index in 0..hyper.modes() {
+        let scales = KalmanNetHyper::default_scales().into_iter();
+        card.scales.extend(scales.map(|(name, scale)| (format!("net.{index}.{name}"), scale)));
+    }
+    Model::new(card, weights(hyper.tensors(), size, seed)).unwrap()
+}
+
+pub fn ensemble(hyper: &EnsKNetsHyper, size: f32) -> Arc<EnsembleNetwork> {
+    Arc::new(EnsembleNetwork::from_model(&ensemble_model(hyper, size, 1)).unwrap())
+}
+
+/// Two KalmanNets that differ and small branches that differ, without attention, for slow objects.
+pub fn tiny_ensemble() -> EnsKNetsHyper {
+    EnsKNetsHyper {
+        rates: vec![0.02, -0.03],
+        acceleration: 1.0,
+        speed: 20.0,
+        normalisation: Normalisation::Running,
+        attention: None,
+        correction: Some(BranchHyper { hidden: 6, layers: 2 }),
+        classification: Some(BranchHyper { hidden: 5, layers: 1 }),
+        nets: [TINY_ONE, TINY_TWO].map(|a| tiny(a, Covariance::Joseph)).into(),
+    }
+}
+
+/// The same with all that is ours.
+pub fn tiny_attention() -> EnsKNetsHyper {
+    EnsKNetsHyper {
+        normalisation: Normalisation::Relative,
+        attention: Some(Attention { sign: Sign::Minus, temperature: Some(0.9), stay: Some(0.95) }),
+        ..tiny_ensemble()
     }
 }
 

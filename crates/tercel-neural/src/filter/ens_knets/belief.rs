@@ -66,6 +66,8 @@ pub struct EnsKNetsBelief {
     pub(super) level: f64,
     /// Time since the last measurement, s.
     pub(super) waited: f64,
+    /// Where the object was born.
+    pub(super) anchor: Vector2<f64>,
     pub(super) memory: Memory,
     pub(super) features: Vec<f32>,
     pub(super) inputs: Vec<f32>,
@@ -73,13 +75,14 @@ pub struct EnsKNetsBelief {
 }
 
 impl EnsKNetsBelief {
-    pub(super) fn new(network: &EnsembleNetwork, modes: Vec<Mode>) -> Self {
+    pub(super) fn new(network: &EnsembleNetwork, modes: Vec<Mode>, anchor: Vector2<f64>) -> Self {
         let hyper = network.hyper();
         EnsKNetsBelief {
             next: modes.clone(),
             modes,
             level: super::attention::USUAL,
             waited: 0.0,
+            anchor,
             memory: Memory::new(&vec![0.0; network.memory()], network.scratch()),
             features: vec![0.0; hyper.inputs()],
             inputs: vec![0.0; hyper.inputs()],
@@ -123,7 +126,17 @@ impl EnsKNetsBelief {
     }
 
     /// Takes the means of what is no state: of weights, probabilities, corrections and memories.
-    pub(super) fn merge_thoughts(&mut self, weight: f64, other: &Self, other_weight: f64) {
+    pub(super) fn merge_thoughts(
+        &mut self,
+        network: &EnsembleNetwork,
+        weight: f64,
+        other: &Self,
+        other_weight: f64,
+    ) {
+        // Remembered positions must count from one place.
+        network.shift(self.memory.stage().0, self.anchor - other.anchor);
+        self.memory.commit();
+        self.anchor = other.anchor;
         let common = share(weight, other_weight);
         for (ours, theirs) in self.modes.iter_mut().zip(&other.modes) {
             // As the states: each with its share of the probabilities.
@@ -145,6 +158,7 @@ impl Clone for EnsKNetsBelief {
             next: self.next.clone(),
             level: self.level,
             waited: self.waited,
+            anchor: self.anchor,
             memory: self.memory.clone(),
             features: self.features.clone(),
             inputs: self.inputs.clone(),
@@ -160,7 +174,7 @@ impl Clone for EnsKNetsBelief {
         for (mode, other) in self.modes.iter_mut().zip(&source.modes) {
             mode.copy(other);
         }
-        (self.level, self.waited) = (source.level, source.waited);
+        (self.level, self.waited, self.anchor) = (source.level, source.waited, source.anchor);
         self.memory.clone_from(&source.memory);
         self.features.clone_from(&source.features);
         self.inputs.clone_from(&source.inputs);

@@ -63,7 +63,9 @@ pub(super) struct Scene<'a> {
     /// Where the measurement puts the object, and the covariance of its error.
     pub reading: Vector2<f64>,
     pub noise: Matrix2<f64>,
+    /// Where the sensor stands, and where the object was born.
     pub origin: Vector2<f64>,
+    pub anchor: Vector2<f64>,
     /// Time since the last measurement, s.
     pub waited: f64,
     /// Units of position and velocity.
@@ -88,12 +90,13 @@ impl Scene<'_> {
         if hyper.correction.is_some() {
             self.modes.iter().for_each(|mode| to.push(self.placed(&mode.evidence.state).as_slice()));
         }
-        to.push((self.reading - self.origin).as_slice());
+        to.push((self.reading - self.anchor).as_slice());
     }
 
-    /// A state as seen from the sensor: single precision does not reach across a country.
+    /// A state as seen from the birth of the object, which normalisation does not notice: single precision does not reach from
+    /// a radar to the metres of a track.
     fn placed(&self, state: &Vector4<f64>) -> Vector4<f64> {
-        Vector4::new(state[0] - self.origin.x, state[1] - self.origin.y, state[2], state[3])
+        Vector4::new(state[0] - self.anchor.x, state[1] - self.anchor.y, state[2], state[3])
     }
 
     fn relative(&self, attention: bool, to: &mut Row<'_>) {

@@ -187,7 +187,7 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
 
     /// Lets the branches see what the copies of the KalmanNets made of the measurement.
     fn think(&self, belief: &mut EnsKNetsBelief, measurement: &Measurement<2>) {
-        let EnsKNetsBelief { next: modes, memory, features, inputs, outputs, waited, .. } = belief;
+        let EnsKNetsBelief { next: modes, memory, features, inputs, outputs, waited, anchor, .. } = belief;
         let (mut mean, mut attended, mut total) = (Vector4::zeros(), Vector4::zeros(), 0.0);
         for mode in modes.iter() {
             mean += mode.evidence.state / modes.len() as f64;
@@ -202,6 +202,7 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
             reading: reading.value,
             noise: reading.noise,
             origin: self.origin,
+            anchor: *anchor,
             waited: *waited,
             scales: self.network.scales(),
         };
@@ -252,7 +253,7 @@ impl<S: LinearSensor<4, 2>> Filter<4> for EnsKNets<S> {
                 Ok(Mode::new(born, state, self.nets.len()))
             })
             .collect();
-        Ok(EnsKNetsBelief::new(&self.network, modes?))
+        Ok(EnsKNetsBelief::new(&self.network, modes?, self.sensor.read(measurement).value))
     }
 
     fn predict(&self, belief: &mut EnsKNetsBelief, dt: f64) {
@@ -350,7 +351,7 @@ impl<S: LinearSensor<4, 2>> Filter<4> for EnsKNets<S> {
             let mean = net.state(&ours.net).mean;
             net.set_state(&mut ours.net, &Gaussian { mean, covariance: merged.covariance });
         }
-        belief.merge_thoughts(weight, other, other_weight);
+        belief.merge_thoughts(&self.network, weight, other, other_weight);
     }
 
     fn estimate(&self, belief: &EnsKNetsBelief) -> Estimate<4> {

@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use nalgebra::Vector2;
+
 use super::hyper::{BranchHyper, EnsKNetsHyper, Normalisation, STATE, scales};
 use super::{KIND, LABELS};
 use crate::card::Card;
@@ -119,6 +121,20 @@ impl EnsembleNetwork {
     /// Numbers of memory for one object.
     pub(super) fn memory(&self) -> usize {
         self.norm().map_or(0, |norm| norm.memory()) + self.branches.iter().map(Branch::memory).sum::<usize>()
+    }
+
+    /// Moves all positions that a memory knows, m.
+    pub(super) fn shift(&self, memory: &mut [f32], by: Vector2<f64>) {
+        if self.norm().is_none() {
+            return;
+        }
+        // The means follow the count. States begin with their position, and a reading is one.
+        let means = &mut memory[1..][..self.hyper.inputs()];
+        for state in means.chunks_mut(STATE) {
+            for (mean, by) in state.iter_mut().zip(by.iter()) {
+                *mean += *by as f32;
+            }
+        }
     }
 
     /// Numbers of scratch space for a step of one object.
