@@ -5,8 +5,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use nalgebra::Vector4;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use tercel_core::motion::{Motion, Turn};
+use tercel_core::sensor::{ConvertedPolar, Measurement};
 use tercel_neural::filter::{
     Architecture, Attention, BankNetwork, BranchHyper, Covariance, EnsKNetsHyper, EnsembleNetwork, Feature,
     GainNetwork, KalmanNetHyper, NeuralImmHyper, Normalisation, Sign,
@@ -118,3 +121,21 @@ pub fn tiny(architecture: Architecture, covariance: Covariance) -> KalmanNetHype
 
 pub const TINY_ONE: Architecture = Architecture::Stacked { input: 12, hidden: 9, layers: 2, head: 5 };
 pub const TINY_TWO: Architecture = Architecture::Branched { in_mult: 2, out_mult: 3 };
+
+/// An aircraft that turns at this rate, 40 km from the radar, which misses every fifth plot.
+pub fn plots(rate: f64) -> Vec<Option<Measurement<2>>> {
+    let turn = Turn::new(rate, 0.0);
+    let mut state = Vector4::new(40e3, 9e3, -120.0, 150.0);
+    (0..50)
+        .map(|second| {
+            let error = f64::from(second * 7 % 11 - 5);
+            let plot = [state.xy().norm() + 8.0 * error, f64::atan2(state[1], state[0]) - 4e-4 * error];
+            state = turn.transition(&state, 1.0);
+            (second % 5 != 3).then(|| plot.into())
+        })
+        .collect()
+}
+
+pub fn radar() -> ConvertedPolar {
+    ConvertedPolar::new(50.0, 0.003).unwrap()
+}

@@ -6,12 +6,13 @@ use super::hyper::{Attention, Sign};
 /// Smallest weight, so that a motion that was ruled out may come back.
 const FLOOR: f64 = 1e-30;
 
-/// What the exponential mean of the smallest normalised innovation squared begins with: its expectation when one motion is
-/// right.
+/// What the exponential mean of the smallest normalised innovation squared begins with: its expectation when
+/// one motion is right.
 pub(super) const USUAL: f64 = 2.0;
 
 impl Attention {
-    /// Sets the weights after a measurement. `level` is the exponential mean of the smallest normalised innovation squared.
+    /// Sets the weights after a measurement. `level` is the exponential mean of the smallest normalised
+    /// innovation squared.
     pub(super) fn weigh(&self, modes: &mut [Mode], level: &mut f64) {
         let smallest = modes.iter().map(|mode| mode.evidence.nis).fold(f64::INFINITY, f64::min);
         let mut heat = 1.0;
@@ -47,7 +48,8 @@ impl Attention {
         if modes.len() < 2 {
             return;
         }
-        // Of a matrix with `stay` on its diagonal and the rest spread evenly, every mode but the uniform one shrinks by this.
+        // Of a matrix with `stay` on its diagonal and the rest spread evenly, every mode but the uniform one
+        // shrinks by this.
         let kept = ((count * stay - 1.0) / (count - 1.0)).powf(dt);
         for mode in modes {
             mode.weight = 1.0 / count + kept * (mode.weight - 1.0 / count);

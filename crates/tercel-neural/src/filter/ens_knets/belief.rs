@@ -120,7 +120,8 @@ impl EnsKNetsBelief {
         &self.inputs
     }
 
-    /// What the branches answered: a correction for each KalmanNet in units of the card, then a logit for each.
+    /// What the branches answered: a correction for each KalmanNet in units of the card, then a logit for
+    /// each.
     pub fn outputs(&self) -> &[f32] {
         &self.outputs
     }

@@ -93,8 +93,8 @@ impl Scene<'_> {
         to.push((self.reading - self.anchor).as_slice());
     }
 
-    /// A state as seen from the birth of the object, which normalisation does not notice: single precision does not reach from
-    /// a radar to the metres of a track.
+    /// A state as seen from the birth of the object, which normalisation does not notice: single precision
+    /// does not reach from a radar to the metres of a track.
     fn placed(&self, state: &Vector4<f64>) -> Vector4<f64> {
         Vector4::new(state[0] - self.anchor.x, state[1] - self.anchor.y, state[2], state[3])
     }

@@ -26,8 +26,8 @@ use crate::model::Model;
 /// [[nets]]                           # a `KalmanNetHyper` for each rate
 /// ```
 ///
-/// The scales `position` (m) and `velocity` (m/s) of the card are the units of the corrections; those of the KalmanNets have
-/// the prefix of their tensors: `net.0.range`.
+/// The scales `position` (m) and `velocity` (m/s) of the card are the units of the corrections; those of the
+/// KalmanNets have the prefix of their tensors: `net.0.range`.
 ///
 /// ```
 /// use tercel_neural::filter::{Architecture, BranchHyper, EnsKNetsHyper, KalmanNetHyper};
@@ -46,7 +46,8 @@ use crate::model::Model;
 pub struct EnsKNetsHyper {
     /// Turn rate of each KalmanNet, rad/s, positive to the left.
     pub rates: Vec<f64>,
-    /// Standard deviation of the acceleration that is constant within a step, m/s² per axis: it enters the covariances.
+    /// Standard deviation of the acceleration that is constant within a step, m/s² per axis: it enters the
+    /// covariances.
     pub acceleration: f64,
     /// Standard deviation of a new object's velocity, m/s per axis.
     pub speed: f64,
@@ -69,12 +70,14 @@ pub struct EnsKNetsHyper {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normalisation {
-    /// States and measurements, each component normalised by its mean and variance since the birth of the object.
+    /// States and measurements, each component normalised by its mean and variance since the birth of the
+    /// object.
     Running,
-    /// What distinguishes the KalmanNets, in the frame of the line of sight and in fixed units; both branches see the same.
+    /// What distinguishes the KalmanNets, in the frame of the line of sight and in fixed units; both branches
+    /// see the same.
     Relative,
-    /// States and measurements, each component normalised over all of a track, its future included, as the publication does.
-    /// Only [`OfflineEnsKNets`](super::OfflineEnsKNets) can do that.
+    /// States and measurements, each component normalised over all of a track, its future included, as the
+    /// publication does. Only [`OfflineEnsKNets`](super::OfflineEnsKNets) can do that.
     Sequence,
 }
 
@@ -84,11 +87,13 @@ pub enum Normalisation {
 pub struct Attention {
     /// What the normalised innovation squared (NIS) speaks for.
     pub sign: Sign,
-    /// Divides the NIS by `max(1, e / 2)`, with `e` the exponential mean of the smallest NIS of each step, of which this share
-    /// is kept. Noises that are stated too small then do not make one KalmanNet win every step.
+    /// Divides the NIS by `max(1, e / 2)`, with `e` the exponential mean of the smallest NIS of each step, of
+    /// which this share is kept. Noises that are stated too small then do not make one KalmanNet win every
+    /// step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<f64>,
-    /// Probability that the motion is the same after a second: weights go on from those of the last step, as in an IMM.
+    /// Probability that the motion is the same after a second: weights go on from those of the last step, as
+    /// in an IMM.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stay: Option<f64>,
 }
@@ -124,7 +129,8 @@ impl Default for BranchHyper {
 pub(super) const STATE: usize = 4;
 pub(super) const READING: usize = 2;
 
-/// Relative inputs: for each KalmanNet, with one more under attention; and common to all, with a state more under attention.
+/// Relative inputs: for each KalmanNet, with one more under attention; and common to all, with a state more
+/// under attention.
 const EACH: usize = 7;
 const COMMON: usize = 8;
 
@@ -132,7 +138,8 @@ const COMMON: usize = 8;
 const SCALES: [(&str, f64, &str); 2] = [("position", 100.0, "m"), ("velocity", 10.0, "m/s")];
 
 impl EnsKNetsHyper {
-    /// EnsKNets with the branches of the publication, causal: three nets for straight flight and turns of ±10 °/s.
+    /// EnsKNets with the branches of the publication, causal: three nets for straight flight and turns of ±10
+    /// °/s.
     pub fn ens_knets(nets: Vec<KalmanNetHyper>) -> Self {
         let turn = 10.0_f64.to_radians();
         EnsKNetsHyper {
@@ -208,15 +215,16 @@ impl EnsKNetsHyper {
         }
     }
 
-    /// Width of the outputs: a correction `x, y, vx, vy` for each KalmanNet, then a logit for each, as far as there are branches.
+    /// Width of the outputs: a correction `x, y, vx, vy` for each KalmanNet, then a logit for each, as far as
+    /// there are branches.
     pub fn outputs(&self) -> usize {
         let modes = self.modes();
         let width = |branch: &Option<BranchHyper>, each| if branch.is_some() { each * modes } else { 0 };
         width(&self.correction, STATE) + width(&self.classification, 1)
     }
 
-    /// The layers of the branches, by name: `correction.lstm.0`, `correction.lstm.1`, .., `correction.head`, and the same of
-    /// `classification`.
+    /// The layers of the branches, by name: `correction.lstm.0`, `correction.lstm.1`, .., `correction.head`,
+    /// and the same of `classification`.
     pub fn layers(&self) -> Vec<(String, LayerShape)> {
         let modes = self.modes();
         let branches = [
@@ -235,8 +243,8 @@ impl EnsKNetsHyper {
         all
     }
 
-    /// Names and shapes of all tensors: those of the KalmanNets with `net.0.`, `net.1.`, .. before their names, then those of
-    /// the branches.
+    /// Names and shapes of all tensors: those of the KalmanNets with `net.0.`, `net.1.`, .. before their
+    /// names, then those of the branches.
     pub fn tensors(&self) -> Vec<(String, Vec<usize>)> {
         let nets = self.nets.iter().enumerate().flat_map(|(index, net)| {
             net.tensors().into_iter().map(move |(name, shape)| (format!("net.{index}.{name}"), shape))

@@ -30,11 +30,13 @@ pub use offline::OfflineEnsKNets;
 /// The kind of these models in their cards.
 const KIND: &str = "ens-knets";
 
-/// Estimates position and velocity in the plane with several [`KalmanNet`]s, each for a turn rate of its own, whose states a
-/// recurrent branch corrects and another one weighs. With attention to innovations it is AttEnsKNets, without it EnsKNets.
+/// Estimates position and velocity in the plane with several [`KalmanNet`]s, each for a turn rate of its own,
+/// whose states a recurrent branch corrects and another one weighs. With attention to innovations it is
+/// AttEnsKNets, without it EnsKNets.
 ///
 /// ## Recursion
-/// With the states `xᵐ`, innovations `νᵐ` and their covariances `Sᵐ` of the KalmanNets, and the branches `c` and `p`:
+/// With the states `xᵐ`, innovations `νᵐ` and their covariances `Sᵐ` of the KalmanNets, and the branches `c`
+/// and `p`:
 /// ```text
 /// predict   each KalmanNet; the correction δᵐ ← Fᵐ δᵐ; weights w ← w Π if they go on
 /// update    each KalmanNet
@@ -43,26 +45,30 @@ const KIND: &str = "ens-knets";
 ///           no attention    δ = c(x¹, .., xᴹ),  p = softmax p(z)
 /// estimate  x = Σ pᵐ (xᵐ + δᵐ)                          P = Σ pᵐ (Pᵐ + (xᵐ + δᵐ - x)(xᵐ + δᵐ - x)ᵀ)
 /// ```
-/// [`EnsKNetsHyper`] says whether there is attention and of which form, which branches there are, and what they see: with
-/// [`Normalisation::Relative`], in the place of `xᶜ`, the differences between the KalmanNets, their innovations, the weights, and
-/// how far and how accurately the object is seen. Without a correction branch `δ` is zero, without a classification branch all
-/// `p` are alike. What flows into the KalmanNets are measurements alone, so no branch can make them diverge; a branch whose
-/// outputs are not finite is not heard.
+/// [`EnsKNetsHyper`] says whether there is attention and of which form, which branches there are, and what
+/// they see: with [`Normalisation::Relative`], in the place of `xᶜ`, the differences between the KalmanNets,
+/// their innovations, the weights, and how far and how accurately the object is seen. Without a correction
+/// branch `δ` is zero, without a classification branch all `p` are alike. What flows into the KalmanNets are
+/// measurements alone, so no branch can make them diverge; a branch whose outputs are not finite is not
+/// heard.
 ///
-/// A missing measurement is a prediction: the branches do not step, weights and probabilities hold on, and a corrected state is
-/// predicted as any other. Two measurements at one time are two steps of the branches. Likelihoods and gates are those of
-/// the mixture of the corrected states. Mixing ([`set_state`](Filter::set_state)) gives every KalmanNet the state and forgets the
-/// corrections; merging keeps the moments and takes the means of corrections and memories.
+/// A missing measurement is a prediction: the branches do not step, weights and probabilities hold on, and a
+/// corrected state is predicted as any other. Two measurements at one time are two steps of the branches.
+/// Likelihoods and gates are those of the mixture of the corrected states. Mixing
+/// ([`set_state`](Filter::set_state)) gives every KalmanNet the state and forgets the corrections; merging
+/// keeps the moments and takes the means of corrections and memories.
 ///
 /// ## Use it when
-/// there is a model trained for such objects, and about this time between measurements. The covariance says how far the
-/// KalmanNets are apart; it does not know how good the branches are. [`NeuralImm`](super::NeuralImm) corrects a bank of Kalman
-/// filters in the place of KalmanNets, and is the better choice where noises are known.
+/// there is a model trained for such objects, and about this time between measurements. The covariance says
+/// how far the KalmanNets are apart; it does not know how good the branches are.
+/// [`NeuralImm`](super::NeuralImm) corrects a bank of Kalman filters in the place of KalmanNets, and is the
+/// better choice where noises are known.
 ///
 /// ## Reference
-/// "Ensemble of KalmanNets with innovation-based attention for robust target tracking", equations 10 to 14. Deviations: the
-/// sign of equation 13, which as printed prefers the worst motion ([`Sign`]); a factor of one half, and the determinants;
-/// normalisation that knows the past alone; relative inputs, temperature and weights that go on are ours. Models choose.
+/// "Ensemble of KalmanNets with innovation-based attention for robust target tracking", equations 10 to 14.
+/// Deviations: the sign of equation 13, which as printed prefers the worst motion ([`Sign`]); a factor of one
+/// half, and the determinants; normalisation that knows the past alone; relative inputs, temperature and
+/// weights that go on are ours. Models choose.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -262,7 +268,8 @@ impl<S: LinearSensor<4, 2>> Filter<4> for EnsKNets<S> {
         }
         for ((mode, net), motion) in belief.modes.iter_mut().zip(&self.nets).zip(&self.motions) {
             net.predict(&mut mode.net, dt);
-            // The motion is linear: the prediction of a corrected state is that of the state and that of the correction.
+            // The motion is linear: the prediction of a corrected state is that of the state and that of the
+            // correction.
             mode.correction = motion.transition(&mode.correction, dt);
         }
         if let Some(attention) = &self.network.hyper().attention {

@@ -14,8 +14,8 @@ use crate::filter::memory::Room;
 use crate::layer::{Linear, Lstm, RunningNorm};
 use crate::model::{Model, Weights};
 
-/// The networks of an [`EnsKNets`](super::EnsKNets): those of its KalmanNets, the correction branch and the classification
-/// branch.
+/// The networks of an [`EnsKNets`](super::EnsKNets): those of its KalmanNets, the correction branch and the
+/// classification branch.
 ///
 /// It is loaded once and shared by all filters of that model.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,8 +40,8 @@ impl EnsembleNetwork {
     /// Builds the networks of a model of the kind `ens-knets`.
     ///
     /// # Errors
-    /// When the model is of another kind, made for another state than `x, y, vx, vy`, its options or scales make no sense, or
-    /// its tensors are not those of the architecture.
+    /// When the model is of another kind, made for another state than `x, y, vx, vy`, its options or scales
+    /// make no sense, or its tensors are not those of the architecture.
     pub fn from_model(model: &Model) -> Result<Self, ModelError> {
         model.expect(KIND, &LABELS)?;
         let hyper = EnsKNetsHyper::of(model)?;
@@ -94,8 +94,8 @@ impl EnsembleNetwork {
         self.scales
     }
 
-    /// Normalises each column of a sequence of rows of this width over all of them: the instance normalisation of the
-    /// publication, for which the whole track must be there.
+    /// Normalises each column of a sequence of rows of this width over all of them: the instance
+    /// normalisation of the publication, for which the whole track must be there.
     ///
     /// # Panics
     /// When the slice does not hold whole rows.
@@ -143,8 +143,8 @@ impl EnsembleNetwork {
         layers.map(|layer| layer.scratch(1)).max().unwrap_or(0)
     }
 
-    /// Takes the features of one object into the normalisation, moves the memory on by one step, and writes what the branches
-    /// saw and answered.
+    /// Takes the features of one object into the normalisation, moves the memory on by one step, and writes
+    /// what the branches saw and answered.
     pub(super) fn step(
         &self,
         features: &[f32],

@@ -12,13 +12,14 @@ use super::features::Sight;
 use super::{EnsKNets, EnsKNetsBelief, EnsembleNetwork, Normalisation};
 use crate::error::ModelError;
 
-/// Judges recorded tracks with an ensemble of KalmanNets whose inputs are normalised over the whole track, as the publication
-/// does. It is no filter: an estimate depends on measurements that come later.
+/// Judges recorded tracks with an ensemble of KalmanNets whose inputs are normalised over the whole track, as
+/// the publication does. It is no filter: an estimate depends on measurements that come later.
 ///
 /// ## Definition
-/// The KalmanNets and the attention of [`EnsKNets`] run as always. Then each component of what the branches see is divided by
-/// its standard deviation over all measurements of the track, after its mean was taken from it, and the branches run over the
-/// result. Corrections and probabilities are applied as by the filter, without a measurement too.
+/// The KalmanNets and the attention of [`EnsKNets`] run as always. Then each component of what the branches
+/// see is divided by its standard deviation over all measurements of the track, after its mean was taken from
+/// it, and the branches run over the result. Corrections and probabilities are applied as by the filter,
+/// without a measurement too.
 ///
 /// ## Use it when
 /// figures of the publication are to be compared. In a table it stands beside smoothers, not beside filters.
@@ -55,8 +56,8 @@ impl<S: LinearSensor<4, 2>> OfflineEnsKNets<S> {
         self.filter.network()
     }
 
-    /// The estimates of a track that begins with this measurement: one for it, and one for each step after it, which is a time
-    /// in seconds and perhaps a measurement at its end.
+    /// The estimates of a track that begins with this measurement: one for it, and one for each step after
+    /// it, which is a time in seconds and perhaps a measurement at its end.
     ///
     /// # Errors
     /// As [`Filter::birth`] and [`Filter::update`].

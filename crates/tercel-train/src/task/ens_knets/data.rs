@@ -1,4 +1,5 @@
-//! Flights as the KalmanNets of an ensemble followed them: what the branches see, and what they should make of it.
+//! Flights as the KalmanNets of an ensemble followed them: what the branches see, and what they should make
+//! of it.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -27,7 +28,8 @@ pub struct EnsembleDataConfig {
     pub stated: f64,
     /// The accuracy that is assumed for the others.
     pub nominal: Accuracy,
-    /// A standard deviation of converted positions along each axis, m, that is assumed for all flights in the place of both.
+    /// A standard deviation of converted positions along each axis, m, that is assumed for all flights in the
+    /// place of both.
     pub deviation: Option<f64>,
     /// The flights.
     pub flights: FlightsConfig,
@@ -68,7 +70,8 @@ pub(super) struct EnsembleData {
 }
 
 impl EnsembleData {
-    /// The data of a recipe, for these options and KalmanNets, whose tensors have the prefixes of an ensemble.
+    /// The data of a recipe, for these options and KalmanNets, whose tensors have the prefixes of an
+    /// ensemble.
     pub fn new(
         config: &EnsembleDataConfig,
         seed: u64,
@@ -106,6 +109,8 @@ impl EnsembleData {
     fn flight(&self, draw: Draw<'_>, sample: u64) -> Result<Arc<Followed>, TrainError> {
         let key = (draw.split, sample);
         let repeats = self.flights.repeats(draw.split);
+        // What comes again must not depend on the epoch in which a training began or went on.
+        let draw = if repeats { Draw { epoch: 0, ..draw } } else { draw };
         // Another thread that failed has left whole entries behind.
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if repeats && let Some(found) = known().get(&key) {
@@ -168,7 +173,8 @@ impl EnsembleData {
     }
 }
 
-/// An ensemble of the same KalmanNets and inputs whose branches cost next to nothing: the data needs no answers of theirs.
+/// An ensemble of the same KalmanNets and inputs whose branches cost next to nothing: the data needs no
+/// answers of theirs.
 fn smallest(
     hyper: &EnsKNetsHyper,
     mut card: Card,
@@ -203,7 +209,8 @@ pub(super) struct Followed {
     pub inputs: Vec<f32>,
     /// The steps after the first of those measurements.
     pub instants: Vec<Instant>,
-    /// For each instant, what each KalmanNet's state is too much, in the frame of the last measurement's corrections.
+    /// For each instant, what each KalmanNet's state is too much, in the frame of the last measurement's
+    /// corrections.
     pub errors: Vec<[f32; 4]>,
 }
 
@@ -254,7 +261,8 @@ impl Followed {
     }
 }
 
-/// The turn into the line of sight in which corrections are meant: to the mean of the KalmanNets after the last measurement.
+/// The turn into the line of sight in which corrections are meant: to the mean of the KalmanNets after the
+/// last measurement.
 fn sight(belief: &EnsKNetsBelief) -> Matrix2<f64> {
     let mean: Vector4<f64> = belief.evidence().map(|evidence| evidence.state).sum();
     let range = mean.xy().norm();

@@ -46,16 +46,16 @@ pub(super) struct Flights {
     pub rows: usize,
 }
 
-/// The loss of corrections `[rows * members, 4 modes]` and logits `[rows * members, modes]`: one row with the total and its
-/// parts, of which only the first is differentiated.
+/// The loss of corrections `[rows * members, 4 modes]` and logits `[rows * members, modes]`: one row with the
+/// total and its parts, of which only the first is differentiated.
 #[derive(Debug, Clone)]
 pub(super) struct Fusion {
     pub flights: Arc<Flights>,
     pub plan: Arc<Plan>,
 }
 
-/// Columns of the value: total, regression, classification, both before they are divided; root mean squares of elements of
-/// position and velocity; share of the steps with the right manoeuvre.
+/// Columns of the value: total, regression, classification, both before they are divided; root mean squares
+/// of elements of position and velocity; share of the steps with the right manoeuvre.
 pub(super) const COLUMNS: usize = 6;
 
 /// What a step of a flight makes of the outputs.

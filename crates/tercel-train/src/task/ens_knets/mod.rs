@@ -2,18 +2,20 @@
 //!
 //! ## Definition
 //!
-//! The branches of [`tercel_neural::filter::EnsKNets`]. The KalmanNets come from model files and follow each flight with the
-//! very code of the run time; nothing of them is learned, so no gradient flows through them. With the fused estimate `x`, the
-//! probabilities `p` and the manoeuvre flown `y`, the loss is that of two tasks,
+//! The branches of [`tercel_neural::filter::EnsKNets`]. The KalmanNets come from model files and follow each
+//! flight with the very code of the run time; nothing of them is learned, so no gradient flows through them.
+//! With the fused estimate `x`, the probabilities `p` and the manoeuvre flown `y`, the loss is that of two
+//! tasks,
 //!
 //! ```text
 //! L = L_regr / L̄_regr + λ L_ce / L̄_ce,      L_regr = mean of ‖x - truth‖²,      L_ce = mean of -ln p(y)
 //! ```
 //!
-//! where `L̄` are the same of the plain average of the KalmanNets, found once on training flights. A manoeuvre has the
-//! probability of all KalmanNets that turn in its direction. Without a classification branch the second term does not matter.
-//! In the place of the mean square the regression may be the mean root of flights ([`Form::Root`]). Flights that come again in
-//! every epoch are followed once and kept in memory, about 15 kB each.
+//! where `L̄` are the same of the plain average of the KalmanNets, found once on training flights. A
+//! manoeuvre has the probability of all KalmanNets that turn in its direction. Without a classification
+//! branch the second term does not matter. In the place of the mean square the regression may be the mean
+//! root of flights ([`Form::Root`]). Flights that come again in every epoch are followed once and kept in
+//! memory, about 15 kB each.
 //!
 //! ## Use it when
 //!
@@ -22,9 +24,9 @@
 //!
 //! ## Reference
 //!
-//! "Ensemble of KalmanNets with innovation-based attention for robust target tracking", equations 15 to 19. Deviations: the
-//! usual losses are those of some training flights, not of all; classes are directions; measurements may be missing, after
-//! which corrections are predicted as states are.
+//! "Ensemble of KalmanNets with innovation-based attention for robust target tracking", equations 15 to 19.
+//! Deviations: the usual losses are those of some training flights, not of all; classes are directions;
+//! measurements may be missing, after which corrections are predicted as states are.
 
 mod data;
 mod fusion;
@@ -71,7 +73,8 @@ impl Kind for EnsKNetsKind {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EnsembleModel {
-    /// Model files of the KalmanNets, from the folder in which the training runs. Each says for which turn rate it is.
+    /// Model files of the KalmanNets, from the folder in which the training runs. Each says for which turn
+    /// rate it is.
     pub nets: Vec<PathBuf>,
     /// Standard deviation of the acceleration in the covariances, m/s² per axis.
     pub acceleration: f64,
@@ -147,8 +150,8 @@ impl EnsKNetsTask {
     ///
     /// # Errors
     ///
-    /// If a value makes no sense, a model file of a KalmanNet cannot be read or used, or no filter could be made of them; all
-    /// before anything is trained.
+    /// If a value makes no sense, a model file of a KalmanNet cannot be read or used, or no filter could be
+    /// made of them; all before anything is trained.
     pub fn new(recipe: &Recipe<EnsKNetsKind>) -> Result<(Self, ParameterSet), TrainError> {
         let models = recipe.model.nets.iter().map(|path| Model::open(path)).collect::<Result<Vec<_>, _>>()?;
         Self::of_nets(recipe, &models)

@@ -224,6 +224,17 @@ fn dropout_depends_on_the_epoch_and_not_on_the_thread_and_spares_the_validation(
 }
 
 #[test]
+fn flights_that_come_again_are_the_same_in_whichever_epoch_they_are_followed_first() {
+    let data = DATA.replace("training", "fresh = \"nothing\"\ntraining");
+    let inputs = |epochs: &[usize]| {
+        let (task, _) = task(&data, &relative(), "[loss]\nusual = 1\n").unwrap();
+        let last = epochs.iter().map(|epoch| task.batch(Draw { epoch: *epoch, ..draw(&[3]) }).unwrap()).next_back();
+        last.unwrap().flights.flights[0].inputs.clone()
+    };
+    assert_eq!(inputs(&[0, 1]), inputs(&[5]));
+}
+
+#[test]
 fn recipes_that_make_no_sense_are_refused_by_key() {
     for (old, new, key) in [
         ("stated = 0.5", "stated = 1.5", "data.stated"),
