@@ -55,8 +55,7 @@ fn a_branch_whose_outputs_are_not_finite_is_not_heard() {
     tensors.get_mut("correction.head.bias").unwrap().values.fill(f32::MAX);
     tensors.get_mut("correction.lstm.1.bias").unwrap().values.fill(9.0);
     let model = Model::new(model.card().clone(), tensors).unwrap();
-    let filter =
-        EnsKNets::new(Arc::new(EnsembleNetwork::from_model(&model).unwrap()), radar()).unwrap();
+    let filter = EnsKNets::new(Arc::new(EnsembleNetwork::from_model(&model).unwrap()), radar()).unwrap();
     let plots = plots(0.0);
     let mut belief = filter.birth(&plots[0].unwrap()).unwrap();
     for plot in plots[1..].iter().flatten() {

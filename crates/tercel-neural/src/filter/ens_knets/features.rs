@@ -142,7 +142,8 @@ struct Row<'a>(std::slice::IterMut<'a, f32>);
 
 impl Row<'_> {
     fn push(&mut self, values: &[f64]) {
-        for (to, value) in self.0.by_ref().zip(values) {
+        // In this order, since a zip takes from its first part before it finds that the second has ended.
+        for (value, to) in values.iter().zip(self.0.by_ref()) {
             *to = *value as f32;
         }
     }

@@ -228,7 +228,8 @@ fn flights_that_come_again_are_the_same_in_whichever_epoch_they_are_followed_fir
     let data = DATA.replace("training", "fresh = \"nothing\"\ntraining");
     let inputs = |epochs: &[usize]| {
         let (task, _) = task(&data, &relative(), "[loss]\nusual = 1\n").unwrap();
-        let last = epochs.iter().map(|epoch| task.batch(Draw { epoch: *epoch, ..draw(&[3]) }).unwrap()).next_back();
+        let last =
+            epochs.iter().map(|epoch| task.batch(Draw { epoch: *epoch, ..draw(&[3]) }).unwrap()).next_back();
         last.unwrap().flights.flights[0].inputs.clone()
     };
     assert_eq!(inputs(&[0, 1]), inputs(&[5]));
