@@ -21,7 +21,9 @@ fn followed(filter: &EnsKNets<ConvertedPolar>, rate: f64) -> [f64; 3] {
     let mut sums = [0.0; 3];
     for plot in &plots[1..] {
         filter.predict(&mut belief, 1.0);
-        plot.iter().for_each(|plot| drop(filter.update(&mut belief, plot).unwrap()));
+        if let Some(plot) = plot {
+            filter.update(&mut belief, plot).unwrap();
+        }
         sums.iter_mut().zip(belief.weights()).for_each(|(sum, weight)| *sum += weight / 49.0);
     }
     sums
@@ -127,7 +129,9 @@ fn an_offline_ensemble_without_branches_is_the_filter_and_with_them_it_sees_the_
     let mut belief = filter.birth(&plots[0].unwrap()).unwrap();
     for (plot, offline) in plots[1..].iter().zip(&estimates(&average, &plots)[1..]) {
         filter.predict(&mut belief, 1.0);
-        plot.iter().for_each(|plot| drop(filter.update(&mut belief, plot).unwrap()));
+        if let Some(plot) = plot {
+            filter.update(&mut belief, plot).unwrap();
+        }
         assert_eq!(filter.estimate(&belief), *offline);
     }
     let mut later = plots.clone();
@@ -150,7 +154,9 @@ fn the_place_of_birth_does_not_matter_to_a_merged_object() {
         let mut belief = filter.birth(&plots[start].unwrap()).unwrap();
         for plot in &plots[start + 1..30] {
             filter.predict(&mut belief, 1.0);
-            plot.iter().for_each(|plot| drop(filter.update(&mut belief, plot).unwrap()));
+            if let Some(plot) = plot {
+                filter.update(&mut belief, plot).unwrap();
+            }
         }
         belief
     };

@@ -59,12 +59,12 @@ pub(super) struct Fusion {
 pub(super) const COLUMNS: usize = 6;
 
 /// What a step of a flight makes of the outputs.
-struct Fused {
+pub(super) struct Fused {
     /// Probabilities of the KalmanNets.
-    probabilities: Vec<f32>,
+    pub probabilities: Vec<f32>,
     /// Errors of their corrected states, and of the fused one.
     errors: Vec<Vector4<f32>>,
-    error: Vector4<f32>,
+    pub error: Vector4<f32>,
     /// Probability of what is flown; `None` if no KalmanNet flies so.
     flown: Option<f32>,
 }
@@ -111,7 +111,8 @@ impl Plan {
         Vector4::new(position, position, velocity, velocity)
     }
 
-    fn fuse(&self, instant: &Instant, errors: &[[f32; 4]], corrections: &[f32], logits: &[f32]) -> Fused {
+    /// What a step makes of outputs of the branches.
+    pub fn fuse(&self, instant: &Instant, errors: &[[f32; 4]], corrections: &[f32], logits: &[f32]) -> Fused {
         let mut probabilities = logits.to_vec();
         softmax(&mut probabilities);
         let errors: Vec<Vector4<f32>> = errors

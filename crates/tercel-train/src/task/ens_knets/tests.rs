@@ -140,7 +140,9 @@ fn estimates(task: &EnsKNetsTask, set: &ParameterSet, sample: u64) -> Vec<(Estim
         let mut found = vec![filter.estimate(&belief)];
         for plot in &plots[1..] {
             filter.predict(&mut belief, 1.0);
-            plot.iter().for_each(|plot| drop(filter.update(&mut belief, plot).unwrap()));
+            if let Some(plot) = plot {
+                filter.update(&mut belief, plot).unwrap();
+            }
             found.push(filter.estimate(&belief));
         }
         found
