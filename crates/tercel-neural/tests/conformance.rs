@@ -54,6 +54,7 @@ conformance!(
         Imm::new(modes, Transition::sticky(0.95)).unwrap()
     })
 );
+#[allow(clippy::unwrap_used)]
 fn ensemble(hyper: &EnsKNetsHyper, problem: &Problem) -> EnsKNets<Position<2>> {
     EnsKNets::new(untrained::ensemble(hyper, 0.02), problem.sensor()).unwrap()
 }
