@@ -78,7 +78,7 @@ const KIND: &str = "ens-knets";
 ///
 /// // Branches and nets that give zero, beside the gain of an alpha-beta filter. Others come from `Model::open`.
 /// let mut net = KalmanNetHyper::paper(Architecture::two());
-/// net.gain_offset = Some([[0.5, 0.0], [0.0, 0.5], [0.1, 0.0], [0.0, 0.1]]);
+/// net.gain_offset = Some([[0.5, 0.0], [0.0, 0.5], [0.2, 0.0], [0.0, 0.2]]);
 /// let hyper = EnsKNetsHyper::att_ens_knets(vec![net; 3]);
 /// let mut card = Card::new("zero", "ens-knets", &["x", "y", "vx", "vy"]);
 /// card.hyper = hyper.to_table().unwrap();
@@ -87,9 +87,9 @@ const KIND: &str = "ens-knets";
 /// let tensors = hyper.tensors().into_iter().map(|(name, shape)| (name, zeros(shape))).collect();
 /// let network = Arc::new(EnsembleNetwork::from_model(&Model::new(card, tensors)?)?);
 ///
-/// let filter = EnsKNets::new(network, ConvertedPolar::new(50.0, 0.01)?)?;
+/// let filter = EnsKNets::new(network, ConvertedPolar::new(50.0, 0.0005)?)?;
 /// let mut belief = filter.birth(&[80_000.0, 0.30].into())?;
-/// for second in 1..=5 {
+/// for second in 1..=20 {
 ///     filter.predict(&mut belief, 1.0);
 ///     filter.update(&mut belief, &[80_000.0 + 250.0 * f64::from(second), 0.30].into())?;
 /// }
