@@ -7,7 +7,9 @@ use tercel_core::conformance::{Expectations, Problem, positions};
 use tercel_core::filter::{Imm, Transition};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
-use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm};
+use tercel_neural::filter::{
+    Architecture, Covariance, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, NeuralImm, Normalisation,
+};
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
 fn net(hyper: &KalmanNetHyper, problem: &Problem) -> KalmanNet<ConstantVelocity, Position<2>> {
@@ -50,6 +52,31 @@ conformance!(
     positions::<4, _, _>(ORDINARY_TIMES, |p| {
         let modes = [TINY_ONE, TINY_TWO].map(|a| net(&tiny(a, Covariance::Joseph), p));
         Imm::new(modes, Transition::sticky(0.95)).unwrap()
+    })
+);
+#[allow(clippy::unwrap_used)]
+fn ensemble(hyper: &EnsKNetsHyper, problem: &Problem) -> EnsKNets<Position<2>> {
+    EnsKNets::new(untrained::ensemble(hyper, 0.02), problem.sensor()).unwrap()
+}
+
+conformance!(
+    ensemble_of_kalman_nets,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| ensemble(&untrained::tiny_ensemble(), p))
+);
+conformance!(
+    ensemble_with_attention,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| ensemble(&untrained::tiny_attention(), p))
+);
+conformance!(
+    average_of_kalman_nets,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let plain = EnsKNetsHyper {
+            correction: None,
+            classification: None,
+            normalisation: Normalisation::Relative,
+            ..untrained::tiny_ensemble()
+        };
+        ensemble(&plain, p)
     })
 );
 // Its bank merges to the moments of the two; what the network adds to the merged bank is not the mean of what it added.

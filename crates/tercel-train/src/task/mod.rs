@@ -1,5 +1,6 @@
 //! The tasks: one module for each kind of model.
 
+pub mod ens_knets;
 pub mod flights;
 pub mod kalman_net;
 pub mod neural_imm;
@@ -12,8 +13,11 @@ use crate::recipe;
 use crate::trainer::{Progress, Run, Summary};
 
 /// The kinds of recipes.
-pub const KINDS: [&str; 2] =
-    [<kalman_net::KalmanNetKind as recipe::Kind>::NAME, <neural_imm::NeuralImmKind as recipe::Kind>::NAME];
+pub const KINDS: [&str; 3] = [
+    <ens_knets::EnsKNetsKind as recipe::Kind>::NAME,
+    <kalman_net::KalmanNetKind as recipe::Kind>::NAME,
+    <neural_imm::NeuralImmKind as recipe::Kind>::NAME,
+];
 
 /// Trains what a recipe describes; its kind chooses the task.
 ///
@@ -26,6 +30,7 @@ pub fn train(
     observer: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Summary, TrainError> {
     match recipe::kind(recipe)?.as_str() {
+        "ens-knets" => ens_knets::train(recipe, run, observer),
         "kalman-net" => kalman_net::train(recipe, run, observer),
         "neural-imm" => neural_imm::train(recipe, run, observer),
         other => {

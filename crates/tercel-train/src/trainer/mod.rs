@@ -303,7 +303,9 @@ impl<T: Task> Trainer<'_, T> {
         let parts = row.validation_parts.iter().map(|(name, value)| (format!("validation_{name}"), *value));
         let losses = [("training_loss".to_owned(), row.loss), ("validation_loss".to_owned(), row.validation)];
         card.metrics.extend(losses.into_iter().chain(parts).filter_map(|(name, value)| Some((name, value?))));
-        Ok(Model::new(card, self.state.parameters.tensors())?)
+        let mut tensors = self.state.parameters.tensors();
+        tensors.extend(self.task.frozen());
+        Ok(Model::new(card, tensors)?)
     }
 
     /// The model if it is the best, then the checkpoint, then the curve.

@@ -1,5 +1,6 @@
 //! What is trained, as the trainer sees it.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use rand_chacha::ChaCha8Rng;
@@ -79,6 +80,11 @@ pub trait Task: Sync {
     /// The card of the model as far as the task knows it: kind, state, sizes and options, scales. The trainer
     /// fills in the rest.
     fn card(&self) -> Card;
+
+    /// Tensors of the model that are not trained: those of networks that this one builds on.
+    fn frozen(&self) -> BTreeMap<String, tercel_neural::Tensor> {
+        BTreeMap::new()
+    }
 
     /// The number of samples of a split.
     fn samples(&self, split: Split) -> usize;
