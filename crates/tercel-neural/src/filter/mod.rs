@@ -18,3 +18,25 @@ pub use kalman_net::{
 };
 pub use memory::Memory;
 pub use neural_imm::{BankNetwork, NeuralImm, NeuralImmBelief, NeuralImmHyper, Outlook};
+
+use crate::error::ModelError;
+use crate::model::Model;
+
+/// The kinds of models that there are filters for.
+pub const KINDS: [&str; 2] = ["kalman-net", "neural-imm"];
+
+/// Accepts a model of which a filter can be made.
+///
+/// # Errors
+/// When its kind is none of [`KINDS`], or its state, options or tensors are not those of its kind.
+pub fn check(model: &Model) -> Result<(), ModelError> {
+    match model.card().kind.as_str() {
+        "kalman-net" => GainNetwork::from_model(model).map(drop),
+        "neural-imm" => BankNetwork::from_model(model).map(drop),
+        other => Err(ModelError::Kind {
+            file: model.file().clone(),
+            found: other.to_owned(),
+            expected: KINDS.join("`, `"),
+        }),
+    }
+}
