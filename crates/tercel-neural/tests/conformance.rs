@@ -7,7 +7,9 @@ use tercel_core::conformance::{Expectations, Problem, positions};
 use tercel_core::filter::{Imm, Transition};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
-use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm};
+use tercel_neural::filter::{
+    Architecture, Covariance, DeepMtt, KalmanNet, KalmanNetHyper, MnemonicKalman, NeuralImm, TrMtt,
+};
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
 fn net(hyper: &KalmanNetHyper, problem: &Problem) -> KalmanNet<ConstantVelocity, Position<2>> {
@@ -57,5 +59,32 @@ conformance!(
     neural_imm,
     positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
         NeuralImm::new(untrained::neural_imm(&untrained::small_bank(), 0.3, 1), &[p.sensor()]).unwrap()
+    })
+);
+conformance!(
+    mnemonic_kalman,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        MnemonicKalman::new(untrained::mnemonic(&untrained::small_mnemonic(), 0.3), p.sensor())
+    })
+);
+conformance!(
+    imm_of_mnemonic_kalman_filters,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let filter =
+            |size| MnemonicKalman::new(untrained::mnemonic(&untrained::small_mnemonic(), size), p.sensor());
+        Imm::new([filter(0.1), filter(0.3)], Transition::sticky(0.95)).unwrap()
+    })
+);
+// Merging takes the mean of what the networks add, which is not what they would add to the merged front end.
+conformance!(
+    deep_mtt,
+    positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
+        DeepMtt::new(untrained::deep_mtt(&untrained::small_deep_mtt(), 0.3), p.sensor())
+    })
+);
+conformance!(
+    tr_mtt,
+    positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
+        TrMtt::new(untrained::tr_mtt(&untrained::small_tr_mtt(), 0.3), p.sensor())
     })
 );

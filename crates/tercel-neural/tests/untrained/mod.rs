@@ -8,7 +8,8 @@ use std::sync::Arc;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tercel_neural::filter::{
-    Architecture, BankNetwork, Covariance, Feature, GainNetwork, KalmanNetHyper, NeuralImmHyper,
+    Architecture, BankNetwork, Covariance, DeepMttHyper, Feature, GainNetwork, KalmanNetHyper, MnemonicHyper,
+    MnemonicNetwork, NeuralImmHyper, ResidualNetwork, TrMttHyper, TransformerNetwork,
 };
 use tercel_neural::{Card, Model, Tensor};
 
@@ -78,3 +79,43 @@ pub fn tiny(architecture: Architecture, covariance: Covariance) -> KalmanNetHype
 
 pub const TINY_ONE: Architecture = Architecture::Stacked { input: 12, hidden: 9, layers: 2, head: 5 };
 pub const TINY_TWO: Architecture = Architecture::Branched { in_mult: 2, out_mult: 3 };
+
+/// A model with random weights of any kind.
+pub fn model(kind: &str, hyper: toml::Table, tensors: Vec<(String, Vec<usize>)>, size: f32) -> Model {
+    let mut card = Card::new("untrained", kind, &STATE);
+    card.hyper = hyper;
+    Model::new(card, weights(tensors, size, 1)).unwrap()
+}
+
+/// A mnemonic network with random weights.
+pub fn mnemonic(hyper: &MnemonicHyper, size: f32) -> Arc<MnemonicNetwork> {
+    let model = model("mnemonic", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(MnemonicNetwork::from_model(&model).unwrap())
+}
+
+/// A residual network with random weights.
+pub fn deep_mtt(hyper: &DeepMttHyper, size: f32) -> Arc<ResidualNetwork> {
+    let model = model("deep-mtt", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(ResidualNetwork::from_model(&model).unwrap())
+}
+
+/// A transformer with random weights.
+pub fn tr_mtt(hyper: &TrMttHyper, size: f32) -> Arc<TransformerNetwork> {
+    let model = model("tr-mtt", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(TransformerNetwork::from_model(&model).unwrap())
+}
+
+/// Sizes for the objects of the conformance suite.
+pub fn small_mnemonic() -> MnemonicHyper {
+    MnemonicHyper { hidden: 5, acceleration: 1.0, speed: 20.0, ..MnemonicHyper::default() }
+}
+
+pub fn small_deep_mtt() -> DeepMttHyper {
+    DeepMttHyper { layers: vec![5, 4], dense: 3, acceleration: 1.0, speed: 20.0, ..DeepMttHyper::default() }
+}
+
+pub fn small_tr_mtt() -> TrMttHyper {
+    let sizes =
+        TrMttHyper { window: 6, size: 8, heads: 2, encoder: 1, decoder: 1, feed: 9, ..TrMttHyper::default() };
+    TrMttHyper { acceleration: 1.0, speed: 20.0, ..sizes }
+}
