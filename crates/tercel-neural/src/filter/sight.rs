@@ -1,6 +1,6 @@
 //! The frame of the line of sight, in which a radar's errors lie along the axes.
 
-use nalgebra::{Matrix4, Vector2, Vector4};
+use nalgebra::{Matrix4, Vector2};
 use tercel_core::belief::{Cholesky, Gaussian};
 
 /// A frame whose first axis points from the sensor to an object, and the second a quarter turn to the left; or that of the
@@ -70,6 +70,8 @@ pub(crate) fn place(state: &Gaussian<4>, origin: &Vector2<f64>) -> Vector2<f64> 
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector4;
+
     use super::*;
 
     #[test]

@@ -194,16 +194,23 @@ impl Working {
     /// Asks the network about the window. Gives its frame, unless there are too few readings or an output is not finite.
     fn speak(&mut self, network: &TransformerNetwork, origin: &Vector2<f64>) -> Option<Frame> {
         let Working { window, inputs, mask, outputs, scratch } = self;
-        asked(network, origin, (window, inputs, mask), outputs, scratch)
+        asked(network, origin, window, Rows { inputs, mask, outputs }, scratch)
     }
+}
+
+/// What goes into the network and comes out of it.
+struct Rows<'a> {
+    inputs: &'a mut [f32],
+    mask: &'a mut [f32],
+    outputs: &'a mut [f32],
 }
 
 /// Asks a network about a window of readings. Gives the frame of its answer, if there is one.
 fn asked(
     network: &TransformerNetwork,
     origin: &Vector2<f64>,
-    (window, inputs, mask): (&[Option<Vector2<f64>>], &mut [f32], &mut [f32]),
-    outputs: &mut [f32],
+    window: &[Option<Vector2<f64>>],
+    Rows { inputs, mask, outputs }: Rows<'_>,
     scratch: &mut [f32],
 ) -> Option<Frame> {
     let frame = network.hyper().frame(window, origin)?;
@@ -252,8 +259,8 @@ impl<S: Sensor<4, 2>> Filter<4> for TrMtt<S> {
             *last = Some(last.map_or(place, |before| (before + place) / 2.0));
         }
         let TrMttBelief { window, inputs, mask, outputs, scratch, .. } = belief;
-        let room = scratch.stage().1;
-        let frame = asked(&self.network, &self.origin, (window, inputs, mask), outputs, room);
+        let rows = Rows { inputs, mask, outputs };
+        let frame = asked(&self.network, &self.origin, window, rows, scratch.stage().1);
         let hyper = self.network.hyper();
         let last = (hyper.window - 1) * hyper.outputs();
         let said = frame.map(|frame| hyper.said(&frame, &belief.outputs[last..]));
