@@ -9,7 +9,8 @@ use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
 use tercel_neural::filter::{
-    Architecture, Covariance, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, NeuralImm, NeuralImmHyper,
+    Architecture, Covariance, DeepMtt, DeepMttHyper, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
+    MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, TrMtt, TrMttHyper,
 };
 use untrained::{TINY_ONE, network, tiny};
 
@@ -74,5 +75,23 @@ fn ensembles_do_not_allocate() {
         let radar = ConvertedPolar::new(50.0, 0.005).unwrap();
         let filter = EnsKNets::new(untrained::ensemble(&hyper, 0.1), radar).unwrap();
         assert_eq!(allocations(&filter), 0, "{hyper:?}");
+    }
+}
+
+#[test]
+fn filters_that_learn_the_prediction_or_see_windows_do_not_allocate() {
+    let radar = RangeBearing::new(50.0, 0.005).unwrap();
+    for hyper in [MnemonicHyper::default(), MnemonicHyper::paper()] {
+        assert_eq!(
+            allocations(&MnemonicKalman::new(untrained::mnemonic(&hyper, 0.1), radar)),
+            0,
+            "{hyper:?}"
+        );
+    }
+    for hyper in [untrained::small_deep_mtt(), DeepMttHyper { layers: vec![8], ..DeepMttHyper::paper() }] {
+        assert_eq!(allocations(&DeepMtt::new(untrained::deep_mtt(&hyper, 0.1), radar)), 0, "{hyper:?}");
+    }
+    for hyper in [untrained::small_tr_mtt(), TrMttHyper { encoder: 1, decoder: 1, ..TrMttHyper::paper() }] {
+        assert_eq!(allocations(&TrMtt::new(untrained::tr_mtt(&hyper, 0.1), radar)), 0, "{hyper:?}");
     }
 }

@@ -8,7 +8,8 @@ use tercel_core::filter::{Imm, Transition};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
 use tercel_neural::filter::{
-    Architecture, Covariance, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, NeuralImm, Normalisation,
+    Architecture, Covariance, DeepMtt, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, MnemonicKalman,
+    NeuralImm, Normalisation, TrMtt,
 };
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
@@ -84,5 +85,32 @@ conformance!(
     neural_imm,
     positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
         NeuralImm::new(untrained::neural_imm(&untrained::small_bank(), 0.3, 1), &[p.sensor()]).unwrap()
+    })
+);
+conformance!(
+    mnemonic_kalman,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        MnemonicKalman::new(untrained::mnemonic(&untrained::small_mnemonic(), 0.3), p.sensor())
+    })
+);
+conformance!(
+    imm_of_mnemonic_kalman_filters,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let filter =
+            |size| MnemonicKalman::new(untrained::mnemonic(&untrained::small_mnemonic(), size), p.sensor());
+        Imm::new([filter(0.1), filter(0.3)], Transition::sticky(0.95)).unwrap()
+    })
+);
+// Merging takes the mean of what the networks add, which is not what they would add to the merged front end.
+conformance!(
+    deep_mtt,
+    positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
+        DeepMtt::new(untrained::deep_mtt(&untrained::small_deep_mtt(), 0.3), p.sensor())
+    })
+);
+conformance!(
+    tr_mtt,
+    positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
+        TrMtt::new(untrained::tr_mtt(&untrained::small_tr_mtt(), 0.3), p.sensor())
     })
 );

@@ -178,6 +178,51 @@ mod ens_knets {
     }
 }
 
+/// One batch of a recipe of the repository on one core: data, forward and backward of all its windows.
+mod recipes {
+    use super::*;
+    use tercel_train::TrainError;
+    use tercel_train::recipe::{Kind, Recipe};
+    use tercel_train::task::{deep_mtt, mnemonic, tr_mtt};
+    use tercel_train::trainer::{Draw, Split, Task};
+
+    fn batch<K: Kind, T: Task>(
+        bencher: Bencher,
+        text: &str,
+        make: fn(&Recipe<K>) -> Result<(T, ParameterSet), TrainError>,
+    ) {
+        let recipe = Recipe::<K>::parse(text).unwrap();
+        let (task, set) = make(&recipe).unwrap();
+        let samples: Vec<u64> = (0..recipe.schedule.batch as u64).collect();
+        bencher.bench_local(|| {
+            let draw = Draw { split: Split::Training, epoch: 0, seed: recipe.seed, samples: &samples };
+            let batch = task.batch(draw).unwrap();
+            let mut memory = None;
+            for window in 0..task.windows(&batch) {
+                let weights = Weights::trainable(&set);
+                let loss = task.loss(&weights, &batch, window, &mut memory).unwrap();
+                weights.gradients(&loss.value);
+            }
+        });
+    }
+
+    macro_rules! recipe {
+        ($name:ident, $file:literal, $task:ty) => {
+            #[divan::bench(sample_count = 3, sample_size = 1)]
+            fn $name(bencher: Bencher) {
+                batch(bencher, include_str!(concat!("../../../recipes/", $file, ".toml")), <$task>::new);
+            }
+        };
+    }
+
+    recipe!(mnemonic, "mnemonic", mnemonic::MnemonicTask);
+    recipe!(mnemonic_full, "mnemonic-full", mnemonic::MnemonicTask);
+    recipe!(deep_mtt, "deep-mtt", deep_mtt::DeepMttTask);
+    recipe!(deep_mtt_full, "deep-mtt-full", deep_mtt::DeepMttTask);
+    recipe!(tr_mtt, "tr-mtt", tr_mtt::TrMttTask);
+    recipe!(tr_mtt_full, "tr-mtt-full", tr_mtt::TrMttTask);
+}
+
 /// 200 steps of a Kalman filter for 128 objects, forward and backward: prediction, gain, Joseph form,
 /// log-likelihood.
 #[divan::bench(sample_count = 20, sample_size = 1)]

@@ -88,9 +88,7 @@ impl<K: Kind> Recipe<K> {
             return Err(refused("kind", format!("{kind:?}"), format!("this task is {:?}", K::NAME)));
         }
         let recipe: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
-        if recipe.name.is_empty() || recipe.name.contains(['/', '\\']) {
-            return Err(refused("name", format!("{:?}", recipe.name), "it must be a name without slashes"));
-        }
+        named(&recipe.name)?;
         recipe.optimiser.validate()?;
         recipe.schedule.validate()?;
         Ok(Self { text: text.to_owned(), ..recipe })
@@ -124,6 +122,41 @@ pub fn kind(text: &str) -> Result<String, TrainError> {
         return Err(refused("version", header.version, format!("this program reads version {VERSION}")));
     }
     Ok(header.kind)
+}
+
+/// What a program wants to know of a recipe of any kind before it starts.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Outline {
+    /// The kind of task.
+    pub kind: String,
+    /// The name of the model.
+    pub name: String,
+    /// When the parameters change.
+    #[serde(default)]
+    pub schedule: ScheduleConfig,
+}
+
+impl Outline {
+    /// Reads what all recipes have in common. The sections of the kind are not looked at.
+    ///
+    /// # Errors
+    ///
+    /// As [`kind`], and if there is no name, or the schedule is not understood.
+    pub fn parse(text: &str) -> Result<Self, TrainError> {
+        kind(text)?;
+        let outline: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
+        named(&outline.name)?;
+        outline.schedule.validate()?;
+        Ok(outline)
+    }
+}
+
+/// Refuses a name that cannot be that of a file.
+fn named(name: &str) -> Result<(), TrainError> {
+    if name.is_empty() || name.contains(['/', '\\']) {
+        return Err(refused("name", format!("{name:?}"), "it must be a name without slashes"));
+    }
+    Ok(())
 }
 
 /// When the parameters change.
@@ -214,6 +247,17 @@ mod tests {
         let other = Recipe::<Line>::parse(&format!("{MINIMAL}points = 4\n")).unwrap();
         assert_ne!(recipe.hash(), other.hash());
         assert_eq!(recipe.hash().len(), 16);
+    }
+
+    #[test]
+    fn an_outline_is_what_all_kinds_have_in_common() {
+        let outline = Outline::parse(&format!("{MINIMAL}[schedule]\nepochs = 3\n")).unwrap();
+        assert_eq!((outline.kind.as_str(), outline.name.as_str(), outline.schedule.epochs), ("line", "a", 3));
+        for (text, key) in
+            [("[schedule]\nepochs = 0\n", "schedule.epochs"), ("[schedule]\nepoch = 1\n", "epoch")]
+        {
+            assert!(Outline::parse(&format!("{MINIMAL}{text}")).unwrap_err().to_string().contains(key));
+        }
     }
 
     #[test]

@@ -11,8 +11,9 @@ use rand_chacha::ChaCha8Rng;
 use tercel_core::motion::{Motion, Turn};
 use tercel_core::sensor::{ConvertedPolar, Measurement};
 use tercel_neural::filter::{
-    Architecture, Attention, BankNetwork, BranchHyper, Covariance, EnsKNetsHyper, EnsembleNetwork, Feature,
-    GainNetwork, KalmanNetHyper, NeuralImmHyper, Normalisation, Sign,
+    Architecture, Attention, BankNetwork, BranchHyper, Covariance, DeepMttHyper, EnsKNetsHyper,
+    EnsembleNetwork, Feature, GainNetwork, KalmanNetHyper, MnemonicHyper, MnemonicNetwork, NeuralImmHyper,
+    Normalisation, ResidualNetwork, Sign, TrMttHyper, TransformerNetwork,
 };
 use tercel_neural::{Card, Model, Tensor};
 
@@ -138,4 +139,44 @@ pub fn plots(rate: f64) -> Vec<Option<Measurement<2>>> {
 
 pub fn radar() -> ConvertedPolar {
     ConvertedPolar::new(50.0, 0.003).unwrap()
+}
+
+/// A model with random weights of any kind.
+pub fn model(kind: &str, hyper: toml::Table, tensors: Vec<(String, Vec<usize>)>, size: f32) -> Model {
+    let mut card = Card::new("untrained", kind, &STATE);
+    card.hyper = hyper;
+    Model::new(card, weights(tensors, size, 1)).unwrap()
+}
+
+/// A mnemonic network with random weights.
+pub fn mnemonic(hyper: &MnemonicHyper, size: f32) -> Arc<MnemonicNetwork> {
+    let model = model("mnemonic", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(MnemonicNetwork::from_model(&model).unwrap())
+}
+
+/// A residual network with random weights.
+pub fn deep_mtt(hyper: &DeepMttHyper, size: f32) -> Arc<ResidualNetwork> {
+    let model = model("deep-mtt", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(ResidualNetwork::from_model(&model).unwrap())
+}
+
+/// A transformer with random weights.
+pub fn tr_mtt(hyper: &TrMttHyper, size: f32) -> Arc<TransformerNetwork> {
+    let model = model("tr-mtt", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(TransformerNetwork::from_model(&model).unwrap())
+}
+
+/// Sizes for the objects of the conformance suite.
+pub fn small_mnemonic() -> MnemonicHyper {
+    MnemonicHyper { hidden: 5, acceleration: 1.0, speed: 20.0, ..MnemonicHyper::default() }
+}
+
+pub fn small_deep_mtt() -> DeepMttHyper {
+    DeepMttHyper { layers: vec![5, 4], dense: 3, acceleration: 1.0, speed: 20.0, ..DeepMttHyper::default() }
+}
+
+pub fn small_tr_mtt() -> TrMttHyper {
+    let sizes =
+        TrMttHyper { window: 6, size: 8, heads: 2, encoder: 1, decoder: 1, feed: 9, ..TrMttHyper::default() };
+    TrMttHyper { acceleration: 1.0, speed: 20.0, ..sizes }
 }

@@ -10,15 +10,21 @@
 //! square of its length, because the gradient of each slice is a tensor of full size. So recurrent layers
 //! take whole sequences, and recursions in which an output feeds back take single steps.
 
+mod attention;
+mod bidirectional;
 mod dropout;
 mod gru;
+mod layer_norm;
 mod linear;
 mod lstm;
 #[cfg(test)]
 mod tests;
 
+pub use attention::{Attention, Mask};
+pub use bidirectional::Bidirectional;
 pub use dropout::dropout;
 pub use gru::Gru;
+pub use layer_norm::LayerNorm;
 pub use linear::{Activation, Linear};
 pub use lstm::{Lstm, LstmState};
 
