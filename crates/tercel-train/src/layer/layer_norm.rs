@@ -1,7 +1,7 @@
 //! Layer normalisation.
 
 use super::positive;
-use crate::backend::vector::{dispatch, sum_rows};
+use crate::backend::vector::{sum_rows, vectorised};
 use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply};
 use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 
@@ -67,21 +67,8 @@ impl Operation<3> for Normalise {
         let size = x.columns();
         let mut normal = x.values().to_vec();
         let mut values = vec![0.0; normal.len()];
-        let mut scales = Vec::with_capacity(x.rows());
-        dispatch(|| {
-            for (row, value) in normal.chunks_exact_mut(size).zip(values.chunks_exact_mut(size)) {
-                let mean = row.iter().sum::<f32>() / size as f32;
-                row.iter_mut().for_each(|x| *x -= mean);
-                let variance = row.iter().map(|x| x * x).sum::<f32>() / size as f32;
-                let scale = 1.0 / (variance + EPSILON).sqrt();
-                row.iter_mut().for_each(|x| *x *= scale);
-                scales.push(scale);
-                let affine = weight.values().iter().zip(bias.values());
-                for ((value, x), (weight, bias)) in value.iter_mut().zip(&*row).zip(affine) {
-                    *value = weight * x + bias;
-                }
-            }
-        });
+        let mut scales = vec![0.0; x.rows()];
+        normalise(&mut normal, &mut values, &mut scales, weight.values(), bias.values());
         Forward { values, shape: [x.rows(), size], saved: Saved { normal, scales } }
     }
 
@@ -106,5 +93,29 @@ impl Operation<3> for Normalise {
             past.wanted[1].then(|| sum_rows(&products, size)),
             past.wanted[2].then(|| sum_rows(gradient, size)),
         ]
+    }
+}
+
+vectorised! {
+    /// Normalises rows in place, and fills their scales and the values after weight and bias.
+    fn normalise<'a>(
+        normal: &'a mut [f32],
+        values: &'a mut [f32],
+        scales: &'a mut [f32],
+        weight: &'a [f32],
+        bias: &'a [f32],
+    ) {
+        let size = weight.len();
+        let rows = normal.chunks_exact_mut(size).zip(values.chunks_exact_mut(size)).zip(scales);
+        for ((row, value), scale) in rows {
+            let mean = row.iter().sum::<f32>() / size as f32;
+            row.iter_mut().for_each(|x| *x -= mean);
+            let variance = row.iter().map(|x| x * x).sum::<f32>() / size as f32;
+            *scale = 1.0 / (variance + EPSILON).sqrt();
+            row.iter_mut().for_each(|x| *x *= *scale);
+            for ((value, x), (weight, bias)) in value.iter_mut().zip(&*row).zip(weight.iter().zip(bias)) {
+                *value = weight * x + bias;
+            }
+        }
     }
 }

@@ -5,8 +5,8 @@
 //! [`Weights`](crate::Weights) of one graph, so the same model serves any number of threads, in training and
 //! in validation.
 //!
-//! A sequence is one tensor with a row for each step and member of the batch, step after step: row `t * batch
-//! + b`. Taking such a tensor apart step by step inside the graph would cost a time that grows with the
+//! A sequence is one tensor with a row for each step and member of the batch, step after step: row
+//! `t * batch + b`. Taking such a tensor apart step by step inside the graph would cost a time that grows with the
 //! square of its length, because the gradient of each slice is a tensor of full size. So recurrent layers
 //! take whole sequences, and recursions in which an output feeds back take single steps.
 
