@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use tercel_data::DataError;
+use tercel_neural::ModelError;
 use tercel_pipeline::PipelineError;
 use tercel_study::StudyError;
 use tercel_study::report::ReportError;
@@ -39,7 +40,7 @@ impl Report {
     }
 
     /// An error with its causes. A cause that the message before it ends with is not said twice.
-    fn of(error: &dyn Error) -> Self {
+    pub fn of(error: &dyn Error) -> Self {
         let message = error.to_string();
         let mut causes: Vec<String> = Vec::new();
         let mut next = error.source();
@@ -156,6 +157,16 @@ impl From<DataError> for Failure {
             // A file that cannot be opened is one that the user named wrongly.
             DataError::Io { action: "open", .. } => Failure::Input(report),
             DataError::Io { .. } => Failure::Failed(report),
+            _ => Failure::Input(report),
+        }
+    }
+}
+
+impl From<ModelError> for Failure {
+    fn from(error: ModelError) -> Self {
+        let report = Report::of(&error);
+        match error {
+            ModelError::Io { action: "write", .. } => Failure::Failed(report),
             _ => Failure::Input(report),
         }
     }

@@ -56,6 +56,25 @@ impl Progress {
     pub fn step(&self) {
         self.bar.inc(1);
     }
+
+    /// Steps that were done before; they do not count for the time that is left.
+    #[cfg(feature = "train")]
+    pub fn start_at(&self, step: usize) {
+        self.bar.set_position(step as u64);
+        self.bar.reset_eta();
+    }
+
+    /// Says what is being done now.
+    #[cfg(feature = "train")]
+    pub fn say(&self, what: String) {
+        self.bar.set_message(what);
+    }
+
+    /// Prints what should stay, above the bar.
+    #[cfg(feature = "train")]
+    pub fn above(&self, print: impl FnOnce()) {
+        self.bar.suspend(print);
+    }
 }
 
 impl Drop for Progress {

@@ -6,7 +6,7 @@ mod support;
 
 use support::{files, fixtures, run};
 
-const COMMANDS: [&[&str]; 14] = [
+const COMMANDS: [&[&str]; 19] = [
     &[],
     &["track"],
     &["evaluate"],
@@ -20,6 +20,11 @@ const COMMANDS: [&[&str]; 14] = [
     &["study"],
     &["study", "merge"],
     &["study", "list"],
+    &["models"],
+    &["models", "list"],
+    &["models", "show"],
+    &["models", "verify"],
+    &["train"],
     &["completions"],
 ];
 

@@ -9,7 +9,10 @@ use divan::{Bencher, black_box};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Measurement};
-use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper};
+use tercel_neural::filter::{
+    Architecture, Attention, Covariance, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, Normalisation,
+    Sign,
+};
 use untrained::{network, tiny};
 
 fn main() {
@@ -19,9 +22,19 @@ fn main() {
 /// Steps timed together, so that the clock does not count.
 const STEPS: u32 = 100;
 
+fn radar() -> ConvertedPolar {
+    ConvertedPolar::new(50.0, 0.005).unwrap()
+}
+
 fn steps(bencher: Bencher, hyper: &KalmanNetHyper) {
-    let radar = ConvertedPolar::new(50.0, 0.005).unwrap();
-    let filter = KalmanNet::new(network(hyper, 0.1), ConstantVelocity::new(1.0), radar);
+    time(bencher, &KalmanNet::new(network(hyper, 0.1), ConstantVelocity::new(1.0), radar()));
+}
+
+fn ensemble(bencher: Bencher, hyper: &EnsKNetsHyper) {
+    time(bencher, &EnsKNets::new(untrained::ensemble(hyper, 0.1), radar()).unwrap());
+}
+
+fn time<F: Filter<4, Measurement = Measurement<2>>>(bencher: Bencher, filter: &F) {
     let seen: Measurement<2> = [10_000.0, 0.5].into();
     let mut belief = filter.birth(&seen).unwrap();
     bencher.counter(divan::counter::ItemsCount::new(STEPS)).bench_local(|| {
@@ -46,4 +59,25 @@ fn kalman_net_two(bencher: Bencher) {
 #[divan::bench]
 fn kalman_net_two_with_all_options(bencher: Bencher) {
     steps(bencher, &tiny(Architecture::two(), Covariance::Joseph));
+}
+
+/// With three KalmanNets of architecture #2 and branches of two layers of 64, as published.
+#[divan::bench]
+fn att_ens_kalmannets(bencher: Bencher) {
+    ensemble(bencher, &EnsKNetsHyper::att_ens_knets(vec![KalmanNetHyper::paper(Architecture::two()); 3]));
+}
+
+/// The same with all options.
+#[divan::bench]
+fn att_ens_kalmannets_with_all_options(bencher: Bencher) {
+    let nets = vec![tiny(Architecture::two(), Covariance::Joseph); 3];
+    let attention = Attention { sign: Sign::Minus, temperature: Some(0.9), stay: Some(0.97) };
+    ensemble(
+        bencher,
+        &EnsKNetsHyper {
+            normalisation: Normalisation::Relative,
+            attention: Some(attention),
+            ..EnsKNetsHyper::att_ens_knets(nets)
+        },
+    );
 }

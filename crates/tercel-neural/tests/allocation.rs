@@ -8,7 +8,10 @@ use allocation_counter::measure;
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
-use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm, NeuralImmHyper};
+use tercel_neural::filter::{
+    Architecture, Covariance, DeepMtt, DeepMttHyper, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
+    MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, TrMtt, TrMttHyper,
+};
 use untrained::{TINY_ONE, network, tiny};
 
 /// Allocations in 100 steps after ten, in their comparisons and states, and in copies over a belief of the same sizes.
@@ -57,4 +60,38 @@ fn neural_imms_do_not_allocate() {
     let radars = [0.003, 0.01].map(|bearing| RangeBearing::new(50.0, bearing).unwrap());
     assert_eq!(allocations(&NeuralImm::new(network.clone(), &radars).unwrap()), 0);
     assert_eq!(allocations(&NeuralImm::new(network, &radars[..1]).unwrap()), 0);
+}
+
+#[test]
+fn ensembles_do_not_allocate() {
+    let nets = vec![KalmanNetHyper::paper(Architecture::two()); 3];
+    let hypers = [
+        EnsKNetsHyper::ens_knets(nets.clone()),
+        EnsKNetsHyper::att_ens_knets(nets),
+        untrained::tiny_ensemble(),
+        untrained::tiny_attention(),
+    ];
+    for hyper in hypers {
+        let radar = ConvertedPolar::new(50.0, 0.005).unwrap();
+        let filter = EnsKNets::new(untrained::ensemble(&hyper, 0.1), radar).unwrap();
+        assert_eq!(allocations(&filter), 0, "{hyper:?}");
+    }
+}
+
+#[test]
+fn filters_that_learn_the_prediction_or_see_windows_do_not_allocate() {
+    let radar = RangeBearing::new(50.0, 0.005).unwrap();
+    for hyper in [MnemonicHyper::default(), MnemonicHyper::paper()] {
+        assert_eq!(
+            allocations(&MnemonicKalman::new(untrained::mnemonic(&hyper, 0.1), radar)),
+            0,
+            "{hyper:?}"
+        );
+    }
+    for hyper in [untrained::small_deep_mtt(), DeepMttHyper { layers: vec![8], ..DeepMttHyper::paper() }] {
+        assert_eq!(allocations(&DeepMtt::new(untrained::deep_mtt(&hyper, 0.1), radar)), 0, "{hyper:?}");
+    }
+    for hyper in [untrained::small_tr_mtt(), TrMttHyper { encoder: 1, decoder: 1, ..TrMttHyper::paper() }] {
+        assert_eq!(allocations(&TrMtt::new(untrained::tr_mtt(&hyper, 0.1), radar)), 0, "{hyper:?}");
+    }
 }

@@ -7,7 +7,10 @@ use tercel_core::conformance::{Expectations, Problem, positions};
 use tercel_core::filter::{Imm, Transition};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
-use tercel_neural::filter::{Architecture, Covariance, KalmanNet, KalmanNetHyper, NeuralImm};
+use tercel_neural::filter::{
+    Architecture, Covariance, DeepMtt, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, MnemonicKalman,
+    NeuralImm, Normalisation, TrMtt,
+};
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
 fn net(hyper: &KalmanNetHyper, problem: &Problem) -> KalmanNet<ConstantVelocity, Position<2>> {
@@ -52,10 +55,62 @@ conformance!(
         Imm::new(modes, Transition::sticky(0.95)).unwrap()
     })
 );
+#[allow(clippy::unwrap_used)]
+fn ensemble(hyper: &EnsKNetsHyper, problem: &Problem) -> EnsKNets<Position<2>> {
+    EnsKNets::new(untrained::ensemble(hyper, 0.02), problem.sensor()).unwrap()
+}
+
+conformance!(
+    ensemble_of_kalman_nets,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| ensemble(&untrained::tiny_ensemble(), p))
+);
+conformance!(
+    ensemble_with_attention,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| ensemble(&untrained::tiny_attention(), p))
+);
+conformance!(
+    average_of_kalman_nets,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let plain = EnsKNetsHyper {
+            correction: None,
+            classification: None,
+            normalisation: Normalisation::Relative,
+            ..untrained::tiny_ensemble()
+        };
+        ensemble(&plain, p)
+    })
+);
 // Its bank merges to the moments of the two; what the network adds to the merged bank is not the mean of what it added.
 conformance!(
     neural_imm,
     positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
         NeuralImm::new(untrained::neural_imm(&untrained::small_bank(), 0.3, 1), &[p.sensor()]).unwrap()
+    })
+);
+conformance!(
+    mnemonic_kalman,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        MnemonicKalman::new(untrained::mnemonic(&untrained::small_mnemonic(), 0.3), p.sensor())
+    })
+);
+conformance!(
+    imm_of_mnemonic_kalman_filters,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let filter =
+            |size| MnemonicKalman::new(untrained::mnemonic(&untrained::small_mnemonic(), size), p.sensor());
+        Imm::new([filter(0.1), filter(0.3)], Transition::sticky(0.95)).unwrap()
+    })
+);
+// Merging takes the mean of what the networks add, which is not what they would add to the merged front end.
+conformance!(
+    deep_mtt,
+    positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
+        DeepMtt::new(untrained::deep_mtt(&untrained::small_deep_mtt(), 0.3), p.sensor())
+    })
+);
+conformance!(
+    tr_mtt,
+    positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
+        TrMtt::new(untrained::tr_mtt(&untrained::small_tr_mtt(), 0.3), p.sensor())
     })
 );

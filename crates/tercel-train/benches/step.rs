@@ -1,7 +1,7 @@
 //! Time of a training step: `cargo bench -p tercel-train --bench step`.
 //!
-//! All on one core, except where threads are named. For comparison, on the machine where the figures in the documentation were taken: the LSTM step takes
-//! PyTorch 0.31 to 0.42 s, and that of KalmanNet #2 1.01 s.
+//! All on one core, except where threads are named. For comparison, on the machine where the figures in the
+//! documentation were taken: the LSTM step takes PyTorch 0.31 to 0.42 s, and that of KalmanNet #2 1.01 s.
 
 #![allow(clippy::unwrap_used)]
 
@@ -106,7 +106,123 @@ mod kalman_net {
     }
 }
 
-/// 200 steps of a Kalman filter for 128 objects, forward and backward: prediction, gain, Joseph form, log-likelihood.
+/// One update of the published branches of an ensemble on 128 flights of 200 steps.
+mod ens_knets {
+    use super::*;
+    use tercel_neural::filter::{Architecture, KalmanNetHyper};
+    use tercel_neural::{Card, Model, Scale, Tensor as Stored};
+    use tercel_train::recipe::Recipe;
+    use tercel_train::task::ens_knets::{EnsKNetsKind, EnsKNetsTask};
+    use tercel_train::trainer::{Draw, Loss, Split, Task};
+
+    fn net(architecture: Architecture, rate: f64) -> Model {
+        let gain_offset = Some([[0.5, 0.0], [0.0, 0.5], [0.1, 0.0], [0.0, 0.1]]);
+        let hyper = KalmanNetHyper { gain_offset, ..KalmanNetHyper::paper(architecture) };
+        let mut card = Card::new("net", "kalman-net", &["x", "y", "vx", "vy"]);
+        card.hyper = hyper.to_table().unwrap();
+        card.scales.insert("turn_rate".into(), Scale { value: rate, unit: "rad/s".into() });
+        let zeros = |shape: Vec<usize>| Stored { values: vec![0.0; shape.iter().product()], shape };
+        let tensors = hyper.tensors().into_iter().map(|(name, shape)| (name, zeros(shape)));
+        Model::new(card, tensors.collect()).unwrap()
+    }
+
+    fn task(architecture: Architecture, fresh: &str) -> (EnsKNetsTask, ParameterSet) {
+        let text = format!(
+            "version = 1\nkind = \"ens-knets\"\nname = \"ensemble\"\n[data.flights]\nfresh = \"{fresh}\"\n[model]\n\
+             nets = []\nacceleration = 10.0\nspeed = 300.0\nnormalisation = \"relative\"\ndropout = 0.2\n\
+             attention = {{ sign = \"minus\" }}\ncorrection = {{ hidden = 64, layers = 2 }}\n\
+             classification = {{ hidden = 64, layers = 2 }}\n[loss]\nusual = 1\n"
+        );
+        let nets = [0.0, 0.17, -0.17].map(|rate| net(architecture, rate));
+        EnsKNetsTask::of_nets(&Recipe::<EnsKNetsKind>::parse(&text).unwrap(), &nets).unwrap()
+    }
+
+    const SAMPLES: [u64; 128] = {
+        let mut samples = [0; 128];
+        let mut i = 0;
+        while i < 128 {
+            samples[i] = i as u64;
+            i += 1;
+        }
+        samples
+    };
+
+    const DRAW: Draw<'_> = Draw { split: Split::Training, epoch: 0, seed: 4, samples: &SAMPLES };
+
+    /// Flights that are followed already: forward, backward, AdamW.
+    #[divan::bench(sample_count = 5, sample_size = 1)]
+    fn update(bencher: Bencher) {
+        let (task, mut set) = task(Architecture::two(), "nothing");
+        let mut optimiser = AdamW::new(OptimiserConfig::default(), &set);
+        task.batch(DRAW).unwrap();
+        bencher.bench_local(|| {
+            let batch = task.batch(DRAW).unwrap();
+            let weights = Weights::trainable(&set);
+            let Loss { value, .. } = task.loss(&weights, &batch, 0, &mut None).unwrap();
+            let gradients = weights.gradients(&value);
+            optimiser.step(&mut set, &gradients, 1e-4)
+        });
+    }
+
+    /// New flights, each followed by three KalmanNets.
+    #[divan::bench(sample_count = 3, sample_size = 1)]
+    fn flights_followed_by_architecture_2(bencher: Bencher) {
+        let (task, _) = task(Architecture::two(), "flights");
+        bencher.bench_local(|| task.batch(DRAW).unwrap());
+    }
+
+    #[divan::bench(sample_count = 2, sample_size = 1)]
+    fn flights_followed_by_architecture_1(bencher: Bencher) {
+        let (task, _) = task(Architecture::one(), "flights");
+        bencher.bench_local(|| task.batch(DRAW).unwrap());
+    }
+}
+
+/// One batch of a recipe of the repository on one core: data, forward and backward of all its windows.
+mod recipes {
+    use super::*;
+    use tercel_train::TrainError;
+    use tercel_train::recipe::{Kind, Recipe};
+    use tercel_train::task::{deep_mtt, mnemonic, tr_mtt};
+    use tercel_train::trainer::{Draw, Split, Task};
+
+    type Made<T> = Result<(T, ParameterSet), TrainError>;
+
+    fn batch<K: Kind, T: Task>(bencher: Bencher, text: &str, make: fn(&Recipe<K>) -> Made<T>) {
+        let recipe = Recipe::<K>::parse(text).unwrap();
+        let (task, set) = make(&recipe).unwrap();
+        let samples: Vec<u64> = (0..recipe.schedule.batch as u64).collect();
+        bencher.bench_local(|| {
+            let draw = Draw { split: Split::Training, epoch: 0, seed: recipe.seed, samples: &samples };
+            let batch = task.batch(draw).unwrap();
+            let mut memory = None;
+            for window in 0..task.windows(&batch) {
+                let weights = Weights::trainable(&set);
+                let loss = task.loss(&weights, &batch, window, &mut memory).unwrap();
+                weights.gradients(&loss.value);
+            }
+        });
+    }
+
+    macro_rules! recipe {
+        ($name:ident, $file:literal, $task:ty) => {
+            #[divan::bench(sample_count = 3, sample_size = 1)]
+            fn $name(bencher: Bencher) {
+                batch(bencher, include_str!(concat!("../../../recipes/", $file, ".toml")), <$task>::new);
+            }
+        };
+    }
+
+    recipe!(mnemonic, "mnemonic", mnemonic::MnemonicTask);
+    recipe!(mnemonic_full, "mnemonic-full", mnemonic::MnemonicTask);
+    recipe!(deep_mtt, "deep-mtt", deep_mtt::DeepMttTask);
+    recipe!(deep_mtt_full, "deep-mtt-full", deep_mtt::DeepMttTask);
+    recipe!(tr_mtt, "tr-mtt", tr_mtt::TrMttTask);
+    recipe!(tr_mtt_full, "tr-mtt-full", tr_mtt::TrMttTask);
+}
+
+/// 200 steps of a Kalman filter for 128 objects, forward and backward: prediction, gain, Joseph form,
+/// log-likelihood.
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn kalman_steps(bencher: Bencher) {
     use nalgebra::Matrix4;

@@ -1,6 +1,7 @@
 //! A hash that stays the same for all time.
 
-/// The 64-bit hash of Fowler, Noll and Vo (FNV-1a): tells one recipe or name from another, and resists no attack.
+/// The 64-bit hash of Fowler, Noll and Vo (FNV-1a): tells one recipe or name from another, and resists no
+/// attack.
 pub fn fnv1a(bytes: &[u8]) -> u64 {
     bytes
         .iter()

@@ -1,9 +1,9 @@
 //! The algebra of the Kalman filter on batches, differentiable.
 //!
-//! States have four components `x, y, vx, vy`, of which the first two are measured. A batch of matrices is a tensor with a
-//! matrix in each row, row by row: `[batch, 16]` for covariances, `[batch, 8]` for gains, `[batch, 4]` for covariances of
-//! readings. Each function is one operation with a backward pass of its own; as compositions of operations on components, a
-//! step of the filter would be hundreds of them.
+//! States have four components `x, y, vx, vy`, of which the first two are measured. A batch of matrices is a
+//! tensor with a matrix in each row, row by row: `[batch, 16]` for covariances, `[batch, 8]` for gains,
+//! `[batch, 4]` for covariances of readings. Each function is one operation with a backward pass of its own;
+//! as compositions of operations on components, a step of the filter would be hundreds of them.
 
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, SMatrix, Vector2};
 

@@ -1,8 +1,8 @@
 //! Trains the networks inside learned filters.
 //!
-//! A [`recipe`] says what is trained, on which data and how. Its kind chooses a [task]: a differentiable model, its
-//! data and its loss. The [trainer] takes the task through epochs of updates and leaves a model that
-//! [`tercel_neural`] runs, a checkpoint to go on from, and a learning curve.
+//! A [`recipe`] says what is trained, on which data and how. Its kind chooses a [task]: a differentiable
+//! model, its data and its loss. The [trainer] takes the task through epochs of updates and leaves a model
+//! that [`tercel_neural`] runs, a checkpoint to go on from, and a learning curve.
 //!
 //! ```text
 //! recipe ─► task ─► batch ─► shards ─► loss, backward (one thread each) ─► sum ─► AdamW ─► parameters
@@ -10,14 +10,15 @@
 //!           model file ◄─ best validation ◄─ checkpoint and curve, after each epoch ◄─────────┘
 //! ```
 //!
-//! - **The same result again.** All that is random follows from the seed, the epoch and the number of a sample. A batch
-//!   is split into a fixed number of shards whose gradients are summed in order, so the weights do not depend on the
-//!   number of threads, and a training that was interrupted ends with the same weights, bit for bit.
-//! - **Nothing is lost.** Files appear whole or not at all. A training that is killed, or finds the disk full, leaves the
-//!   last good model. Updates whose loss or gradient is not finite are skipped and counted.
-//! - **Few, large operations.** A recurrent layer over a whole sequence is one operation with a backward pass by hand
-//!   ([`backend::Operation`]), and so are the steps of a filter's recursion. Recording small operations is what
-//!   training on a processor mostly spends its time on.
+//! - **The same result again.** All that is random follows from the seed, the epoch and the number of a
+//!   sample. A batch is split into a fixed number of shards whose gradients are summed in order, so the
+//!   weights do not depend on the number of threads, and a training that was interrupted ends with the same
+//!   weights, bit for bit.
+//! - **Nothing is lost.** Files appear whole or not at all. A training that is killed, or finds the disk
+//!   full, leaves the last good model. Updates whose loss or gradient is not finite are skipped and counted.
+//! - **Few, large operations.** A recurrent layer over a whole sequence is one operation with a backward pass
+//!   by hand ([`backend::Operation`]), and so are the steps of a filter's recursion. Recording small
+//!   operations is what training on a processor mostly spends its time on.
 //!
 //! # A task of a new kind
 //!
@@ -90,11 +91,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Tensors are matrices with a row for each member of a batch; a sequence has its steps one below the other. What the run
-//! time must repeat (feature definitions, names and shapes of tensors) is defined in [`tercel_neural`] and tied to the
-//! model here by a test that compares the two over a whole sequence. A network that feeds on the outputs of others that are
-//! trained already reads them with [`Weights::frozen`], which records nothing. Operations with a backward pass by hand are
-//! checked against differences; copy one of those tests with the operation.
+//! Tensors are matrices with a row for each member of a batch; a sequence has its steps one below the other.
+//! What the run time must repeat (feature definitions, names and shapes of tensors) is defined in
+//! [`tercel_neural`] and tied to the model here by a test that compares the two over a whole sequence. A
+//! network that feeds on the outputs of others that are trained already reads them with [`Weights::frozen`],
+//! which records nothing. Operations with a backward pass by hand are checked against differences; copy one
+//! of those tests with the operation.
 
 pub mod backend;
 mod check;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::backend::vector::dispatch;
+use crate::backend::vector::vectorised;
 use crate::check::{self, at_least, within};
 use crate::{ParameterSet, TrainError};
 
@@ -110,8 +110,8 @@ impl OptimiserConfig {
 ///
 /// ## Reference
 ///
-/// I. Loshchilov, F. Hutter, "Decoupled weight decay regularization", ICLR 2019, algorithm 2, in the form of PyTorch, whose
-/// decay is multiplied with the learning rate.
+/// I. Loshchilov, F. Hutter, "Decoupled weight decay regularization", ICLR 2019, algorithm 2, in the form of
+/// PyTorch, whose decay is multiplied with the learning rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdamW {
     config: OptimiserConfig,
@@ -140,8 +140,8 @@ impl AdamW {
         self.updates
     }
 
-    /// Changes the parameters by one step. Gives the norm of the gradients before clipping, or `None` if it is not
-    /// finite, in which case nothing was changed.
+    /// Changes the parameters by one step. Gives the norm of the gradients before clipping, or `None` if it
+    /// is not finite, in which case nothing was changed.
     pub fn step(&mut self, set: &mut ParameterSet, gradients: &[Vec<f32>], rate: f64) -> Option<f64> {
         let norm = norm(gradients);
         if !norm.is_finite() {
@@ -166,10 +166,7 @@ impl AdamW {
                 root: (1.0 / second_correction.sqrt()) as f32,
                 epsilon: config.epsilon as f32,
             };
-            dispatch(
-                Update::apply,
-                (update, values, gradient.as_slice(), first.as_mut_slice(), second.as_mut_slice()),
-            );
+            change(&update, values, gradient, first, second);
         }
         Some(norm)
     }
@@ -185,10 +182,15 @@ struct Update {
     epsilon: f32,
 }
 
-impl Update {
+vectorised! {
     /// Changes values and moments.
-    #[inline(always)]
-    fn apply((update, values, gradient, first, second): Change<'_>) {
+    fn change<'a>(
+        update: &'a Update,
+        values: &'a mut [f32],
+        gradient: &'a [f32],
+        first: &'a mut [f32],
+        second: &'a mut [f32],
+    ) {
         let moments = first.iter_mut().zip(second);
         for ((value, gradient), (first, second)) in values.iter_mut().zip(gradient).zip(moments) {
             let gradient = gradient * update.shrink;
@@ -199,9 +201,6 @@ impl Update {
         }
     }
 }
-
-/// An update, and what it is applied to: values, gradients and both moments.
-type Change<'a> = (Update, &'a mut [f32], &'a [f32], &'a mut [f32], &'a mut [f32]);
 
 /// The Euclidean norm of all gradients together.
 pub fn norm(gradients: &[Vec<f32>]) -> f64 {
@@ -221,7 +220,8 @@ pub fn norm(gradients: &[Vec<f32>]) -> f64 {
 ///
 /// ## Reference
 ///
-/// I. Loshchilov, F. Hutter, "SGDR: stochastic gradient descent with warm restarts", ICLR 2017, Eq. (5), without restarts.
+/// I. Loshchilov, F. Hutter, "SGDR: stochastic gradient descent with warm restarts", ICLR 2017, Eq. (5),
+/// without restarts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cosine {
     /// The highest rate.

@@ -1,9 +1,10 @@
 //! The parameters of a model: named, ordered, and kept as plain numbers.
 //!
-//! Between the steps of a training the parameters are vectors in a [`ParameterSet`], and so are their gradients. The
-//! optimiser, the checkpoints and the model files then are loops over numbers whose result does not depend on a framework
-//! or on the number of threads. Each graph gets leaves of its own ([`Weights`]), because graphs that share a leaf would
-//! share a lock. This is why the `Module` of burn, which holds tensors, is not used.
+//! Between the steps of a training the parameters are vectors in a [`ParameterSet`], and so are their
+//! gradients. The optimiser, the checkpoints and the model files then are loops over numbers whose result
+//! does not depend on a framework or on the number of threads. Each graph gets leaves of its own
+//! ([`Weights`]), because graphs that share a leaf would share a lock. This is why the `Module` of burn,
+//! which holds tensors, is not used.
 
 use std::collections::BTreeMap;
 
@@ -22,13 +23,14 @@ use crate::store::Named;
 pub enum Initial {
     /// The same value everywhere.
     Constant(f32),
-    /// Uniform in `[-bound, bound]`. PyTorch has `1 / sqrt(inputs)` for linear layers and `1 / sqrt(hidden)` for
-    /// recurrent ones.
+    /// Uniform in `[-bound, bound]`. PyTorch has `1 / sqrt(inputs)` for linear layers and `1 / sqrt(hidden)`
+    /// for recurrent ones.
     Uniform {
         /// The largest magnitude.
         bound: f32,
     },
-    /// Orthonormal rows or columns, in blocks of as many columns as there are rows if it is wide, times a gain.
+    /// Orthonormal rows or columns, in blocks of as many columns as there are rows if it is wide, times a
+    /// gain.
     Orthogonal {
         /// The gain.
         gain: f32,
@@ -80,8 +82,8 @@ pub struct ParameterId(usize);
 
 /// All parameters of a model, in the order in which its layers added them.
 ///
-/// The values with which a parameter starts depend on the seed and on its name alone, so a layer that is added to a model
-/// leaves the others as they were.
+/// The values with which a parameter starts depend on the seed and on its name alone, so a layer that is
+/// added to a model leaves the others as they were.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterSet {
     seed: u64,
@@ -98,7 +100,8 @@ impl ParameterSet {
     ///
     /// # Errors
     ///
-    /// If the name is taken, a dimension is zero, there are more than two, or given values do not fill the shape.
+    /// If the name is taken, a dimension is zero, there are more than two, or given values do not fill the
+    /// shape.
     pub fn add(&mut self, name: &str, shape: &[usize], initial: Initial) -> Result<ParameterId, TrainError> {
         let fault = |problem: String| Err(TrainError::Parameter { name: name.to_owned(), problem });
         if self.entries.iter().any(|entry| entry.name == name) {
@@ -202,8 +205,8 @@ impl ParameterSet {
     }
 }
 
-/// The columns of the Q factor of a Gaussian matrix are uniformly distributed over orthonormal frames, once the signs are
-/// fixed by the diagonal of R (Mezzadri 2007).
+/// The columns of the Q factor of a Gaussian matrix are uniformly distributed over orthonormal frames, once
+/// the signs are fixed by the diagonal of R (Mezzadri 2007).
 fn orthogonal(shape: &[usize], gain: f32, random: &mut ChaCha8Rng) -> Vec<f32> {
     let [rows, columns] = match *shape {
         [rows, columns] => [rows, columns],

@@ -13,7 +13,8 @@
 //! [schedule]               # ScheduleConfig
 //! ```
 //!
-//! A key that is not understood is an error that names it and its line, and values are checked before any training starts.
+//! A key that is not understood is an error that names it and its line, and values are checked before any
+//! training starts.
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -79,23 +80,22 @@ impl<K: Kind> Recipe<K> {
     ///
     /// # Errors
     ///
-    /// If it is not TOML, has a key that is not understood, lacks one, is of another kind or version, or a value is
-    /// impossible.
+    /// If it is not TOML, has a key that is not understood, lacks one, is of another kind or version, or a
+    /// value is impossible.
     pub fn parse(text: &str) -> Result<Self, TrainError> {
         let kind = kind(text)?;
         if kind != K::NAME {
             return Err(refused("kind", format!("{kind:?}"), format!("this task is {:?}", K::NAME)));
         }
         let recipe: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
-        if recipe.name.is_empty() || recipe.name.contains(['/', '\\']) {
-            return Err(refused("name", format!("{:?}", recipe.name), "it must be a name without slashes"));
-        }
+        named(&recipe.name)?;
         recipe.optimiser.validate()?;
         recipe.schedule.validate()?;
         Ok(Self { text: text.to_owned(), ..recipe })
     }
 
-    /// The hash of the text, as 16 hexadecimal digits: tells whether a checkpoint or model belongs to the recipe.
+    /// The hash of the text, as 16 hexadecimal digits: tells whether a checkpoint or model belongs to the
+    /// recipe.
     pub fn hash(&self) -> String {
         format!("{:016x}", fnv1a(self.text.as_bytes()))
     }
@@ -124,6 +124,41 @@ pub fn kind(text: &str) -> Result<String, TrainError> {
     Ok(header.kind)
 }
 
+/// What a program wants to know of a recipe of any kind before it starts.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Outline {
+    /// The kind of task.
+    pub kind: String,
+    /// The name of the model.
+    pub name: String,
+    /// When the parameters change.
+    #[serde(default)]
+    pub schedule: ScheduleConfig,
+}
+
+impl Outline {
+    /// Reads what all recipes have in common. The sections of the kind are not looked at.
+    ///
+    /// # Errors
+    ///
+    /// As [`kind`], and if there is no name, or the schedule is not understood.
+    pub fn parse(text: &str) -> Result<Self, TrainError> {
+        kind(text)?;
+        let outline: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
+        named(&outline.name)?;
+        outline.schedule.validate()?;
+        Ok(outline)
+    }
+}
+
+/// Refuses a name that cannot be that of a file.
+fn named(name: &str) -> Result<(), TrainError> {
+    if name.is_empty() || name.contains(['/', '\\']) {
+        return Err(refused("name", format!("{name:?}"), "it must be a name without slashes"));
+    }
+    Ok(())
+}
+
 /// When the parameters change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -143,8 +178,8 @@ pub struct ScheduleConfig {
     pub epochs: usize,
     /// Samples in a batch.
     pub batch: usize,
-    /// Parts into which a batch is split, each with a graph of its own. The result depends on it by rounding; it does
-    /// not depend on the number of threads, of which there is use for as many.
+    /// Parts into which a batch is split, each with a graph of its own. The result depends on it by rounding;
+    /// it does not depend on the number of threads, of which there is use for as many.
     pub shards: usize,
     /// When the parameters change.
     pub update: UpdateEach,
@@ -212,6 +247,17 @@ mod tests {
         let other = Recipe::<Line>::parse(&format!("{MINIMAL}points = 4\n")).unwrap();
         assert_ne!(recipe.hash(), other.hash());
         assert_eq!(recipe.hash().len(), 16);
+    }
+
+    #[test]
+    fn an_outline_is_what_all_kinds_have_in_common() {
+        let outline = Outline::parse(&format!("{MINIMAL}[schedule]\nepochs = 3\n")).unwrap();
+        assert_eq!((outline.kind.as_str(), outline.name.as_str(), outline.schedule.epochs), ("line", "a", 3));
+        for (text, key) in
+            [("[schedule]\nepochs = 0\n", "schedule.epochs"), ("[schedule]\nepoch = 1\n", "epoch")]
+        {
+            assert!(Outline::parse(&format!("{MINIMAL}{text}")).unwrap_err().to_string().contains(key));
+        }
     }
 
     #[test]

@@ -11,8 +11,8 @@ use crate::TrainError;
 /// A tensor on its way to or from a file: name, shape, values in row-major order.
 pub type Named = (String, Vec<usize>, Vec<f32>);
 
-/// Writes a file beside its target, flushes it to the disk, and renames it: an interrupted or failed write leaves the old
-/// file.
+/// Writes a file beside its target, flushes it to the disk, and renames it: an interrupted or failed write
+/// leaves the old file.
 ///
 /// # Errors
 ///

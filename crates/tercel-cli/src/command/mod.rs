@@ -4,9 +4,11 @@ mod completions;
 mod config;
 mod convert;
 mod evaluate;
+mod models;
 mod simulate;
 mod study;
 mod track;
+mod train;
 
 use clap::Subcommand;
 
@@ -23,6 +25,9 @@ pub enum Command {
     Config(config::ConfigCommand),
     Simulate(simulate::SimulateArguments),
     Study(study::StudyArguments),
+    #[command(subcommand)]
+    Models(models::ModelsCommand),
+    Train(train::TrainArguments),
     Completions(completions::CompletionsArguments),
 }
 
@@ -36,6 +41,8 @@ impl Command {
             Command::Config(command) => command.run(console),
             Command::Simulate(arguments) => arguments.run(console),
             Command::Study(arguments) => arguments.run(console),
+            Command::Models(command) => command.run(console),
+            Command::Train(arguments) => arguments.run(console),
             Command::Completions(arguments) => arguments.run(),
         }
     }

@@ -5,6 +5,9 @@
 //! | [`Linear`] | nothing |
 //! | [`Gru`] | one row of its size |
 //! | [`Lstm`] | two rows of its size |
+//! | [`Bidirectional`] | nothing: takes a whole window |
+//! | [`Attention`] | nothing: takes a whole window |
+//! | [`LayerNorm`] | nothing |
 //! | [`RunningNorm`] | count, means and squares of its channels |
 //! | [`activation`] | nothing: passes over a slice |
 //!
@@ -17,8 +20,11 @@
 //! machines round twice where the others round once, which changes the last digits: about 1e-7 in a layer.
 
 pub mod activation;
+mod attention;
+mod bidirectional;
 mod dispatch;
 mod gru;
+mod layer_norm;
 mod linear;
 mod lstm;
 mod matrix;
@@ -27,7 +33,10 @@ mod shape;
 #[cfg(test)]
 mod tests;
 
+pub use attention::{Attention, positions};
+pub use bidirectional::Bidirectional;
 pub use gru::Gru;
+pub use layer_norm::LayerNorm;
 pub use linear::Linear;
 pub use lstm::Lstm;
 pub use running_norm::RunningNorm;

@@ -1,6 +1,6 @@
 //! Which tensors a layer is made of.
 
-use super::{Gru, Linear, Lstm};
+use super::{Attention, Bidirectional, Gru, LayerNorm, Linear, Lstm};
 use crate::error::ModelError;
 use crate::model::Weights;
 
@@ -37,6 +37,23 @@ pub enum LayerShape {
         /// Width of the output.
         size: usize,
     },
+    /// A [`Bidirectional`] layer.
+    Bidirectional {
+        /// Width of an input row.
+        inputs: usize,
+        /// Width of the output of each half.
+        size: usize,
+    },
+    /// An [`Attention`] layer.
+    Attention {
+        /// Width of a row.
+        size: usize,
+    },
+    /// A [`LayerNorm`].
+    LayerNorm {
+        /// Width of a row.
+        size: usize,
+    },
 }
 
 impl LayerShape {
@@ -44,7 +61,19 @@ impl LayerShape {
     pub fn tensors(self, name: &str) -> Vec<(String, Vec<usize>)> {
         // Sizes come from files: those that overflow fit no tensor.
         let times = usize::saturating_mul;
+        let within = |parts: &[(&str, LayerShape)]| {
+            parts.iter().flat_map(|(part, shape)| shape.tensors(&format!("{name}.{part}"))).collect()
+        };
         let parts = match self {
+            LayerShape::Bidirectional { inputs, size } => {
+                let half = LayerShape::Lstm { inputs, size };
+                return within(&[("forward", half), ("backward", half)]);
+            }
+            LayerShape::Attention { size } => {
+                let part = LayerShape::Linear { inputs: size, outputs: size };
+                return within(&[("query", part), ("key", part), ("value", part), ("output", part)]);
+            }
+            LayerShape::LayerNorm { size } => vec![("weight", vec![size]), ("bias", vec![size])],
             LayerShape::Linear { inputs, outputs } => {
                 vec![("weight", vec![inputs, outputs]), ("bias", vec![outputs])]
             }
@@ -96,5 +125,36 @@ impl Weights<'_> {
     pub fn lstm(&mut self, name: &str, inputs: usize, size: usize) -> Result<Lstm, ModelError> {
         let parts = self.layer(name, LayerShape::Lstm { inputs, size })?;
         Ok(Lstm::new(inputs, size, parts[0], parts[1], parts[2]))
+    }
+    /// Takes a bidirectional layer.
+    ///
+    /// # Errors
+    /// When one of its tensors is missing or has another shape.
+    pub fn bidirectional(
+        &mut self,
+        name: &str,
+        inputs: usize,
+        size: usize,
+    ) -> Result<Bidirectional, ModelError> {
+        let forward = self.lstm(&format!("{name}.forward"), inputs, size)?;
+        Ok(Bidirectional::new(forward, self.lstm(&format!("{name}.backward"), inputs, size)?))
+    }
+
+    /// Takes an attention layer, whose heads divide its size.
+    ///
+    /// # Errors
+    /// When one of its tensors is missing or has another shape.
+    pub fn attention(&mut self, name: &str, size: usize, heads: usize) -> Result<Attention, ModelError> {
+        let mut part = |part: &str| self.linear(&format!("{name}.{part}"), size, size);
+        Ok(Attention::new(heads, part("query")?, part("key")?, part("value")?, part("output")?))
+    }
+
+    /// Takes a layer normalisation.
+    ///
+    /// # Errors
+    /// When one of its tensors is missing or has another shape.
+    pub fn layer_norm(&mut self, name: &str, size: usize) -> Result<LayerNorm, ModelError> {
+        let parts = self.layer(name, LayerShape::LayerNorm { size })?;
+        Ok(LayerNorm::new(parts[0], parts[1]))
     }
 }

@@ -141,3 +141,86 @@ fn slices_of_different_batches_are_refused() {
     let layer = Linear::new(2, 3, &[0.0; 6], &[0.0; 3]);
     layer.forward(&[0.0; 4], &mut [0.0; 3]);
 }
+
+#[test]
+fn attention_is_the_definition_and_leaves_out_what_is_masked() {
+    let (rows, keys, size, heads) = (3, 5, 12, 3);
+    let weights: Vec<_> = (0..4).map(|i| values(size * size, 20 + i, 0.6)).collect();
+    let biases: Vec<_> = (0..4).map(|i| values(size, 30 + i, 0.3)).collect();
+    let linear = |i: usize| Linear::new(size, size, &weights[i], &biases[i]);
+    let layer = super::Attention::new(heads, linear(0), linear(1), linear(2), linear(3));
+    let (x, memory) = (values(rows * size, 1, 2.0), values(keys * size, 2, 2.0));
+    let mask = [1.0, 0.0, 1.0, 1.0, 0.0];
+    let (mut y, mut scratch) = (vec![0.0; rows * size], vec![f32::NAN; layer.scratch(rows, keys)]);
+    layer.forward(&x, &memory, &mask, &mut y, &mut scratch);
+
+    let project = |x: &[f32], i: usize| product(&doubled(x), &weights[i], &biases[i]);
+    for (x, y) in x.chunks(size).zip(y.chunks(size)) {
+        let query = project(x, 0);
+        let mut mixed = vec![0.0_f32; size];
+        for head in 0..heads {
+            let own = head * 4..head * 4 + 4;
+            let mut shares = vec![0.0; keys];
+            for (key, memory) in memory.chunks(size).enumerate() {
+                let keys = project(memory, 1);
+                let dot: f64 = own.clone().map(|c| query[c] * keys[c]).sum();
+                shares[key] = if mask[key] == 0.0 { 0.0 } else { (dot / 2.0).exp() };
+            }
+            let sum: f64 = shares.iter().sum();
+            for c in own {
+                let values = memory.chunks(size).map(|memory| project(memory, 2)[c]);
+                mixed[c] = values.zip(&shares).map(|(v, s)| v * s / sum).sum::<f64>() as f32;
+            }
+        }
+        close(y, &project(&mixed, 3), 1e-5);
+    }
+}
+
+#[test]
+fn a_bidirectional_layer_is_two_layers_from_both_ends() {
+    let (inputs, size, steps) = (3, 4, 6);
+    let lstm = |seed| {
+        let (wx, wh) = (values(inputs * 4 * size, seed, 0.5), values(size * 4 * size, seed + 1, 0.3));
+        Lstm::new(inputs, size, &wx, &wh, &values(4 * size, seed + 2, 0.3))
+    };
+    let layer = super::Bidirectional::new(lstm(1), lstm(5));
+    let x = values(steps * inputs, 9, 1.0);
+    let (mut y, mut scratch) = (vec![0.0; steps * 2 * size], vec![9.0; layer.scratch()]);
+    layer.forward(&x, &mut y, &mut scratch);
+    let run = |layer: &Lstm, x: Vec<&[f32]>| {
+        let (mut h, mut c, mut scratch) = (vec![0.0; size], vec![0.0; size], vec![0.0; layer.scratch(1)]);
+        let step = |x: &[f32]| {
+            layer.step(x, &mut h, &mut c, &mut scratch);
+            h.clone()
+        };
+        x.into_iter().map(step).collect::<Vec<_>>()
+    };
+    let forward = run(&lstm(1), x.chunks(inputs).collect());
+    let backward = run(&lstm(5), x.chunks(inputs).rev().collect());
+    for (step, y) in y.chunks(2 * size).enumerate() {
+        assert_eq!(y[..size], forward[step]);
+        assert_eq!(y[size..], backward[steps - 1 - step]);
+    }
+}
+
+#[test]
+fn a_layer_norm_gives_rows_of_mean_zero_and_variance_one() {
+    let x = values(40, 3, 70.0);
+    let mut y = vec![0.0; 40];
+    super::LayerNorm::new(&[2.0; 20], &[1.0; 20]).forward(&x, &mut y);
+    for y in y.chunks(20) {
+        let y: Vec<f64> = y.iter().map(|y| (f64::from(*y) - 1.0) / 2.0).collect();
+        let mean = y.iter().sum::<f64>() / 20.0;
+        let variance = y.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / 20.0;
+        assert!(mean.abs() < 1e-6 && (variance - 1.0).abs() < 1e-5, "{mean} {variance}");
+    }
+}
+
+#[test]
+fn positions_tell_the_steps_of_a_window_apart() {
+    let rows = super::positions(25, 16);
+    for (a, b) in (0..25).flat_map(|a| (0..a).map(move |b| (a, b))) {
+        let apart: f32 = (0..16).map(|c| (rows[a * 16 + c] - rows[b * 16 + c]).powi(2)).sum();
+        assert!(apart > 0.1, "{a} {b}");
+    }
+}

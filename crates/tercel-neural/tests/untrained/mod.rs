@@ -5,10 +5,15 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use nalgebra::Vector4;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use tercel_core::motion::{Motion, Turn};
+use tercel_core::sensor::{ConvertedPolar, Measurement};
 use tercel_neural::filter::{
-    Architecture, BankNetwork, Covariance, Feature, GainNetwork, KalmanNetHyper, NeuralImmHyper,
+    Architecture, Attention, BankNetwork, BranchHyper, Covariance, DeepMttHyper, EnsKNetsHyper,
+    EnsembleNetwork, Feature, GainNetwork, KalmanNetHyper, MnemonicHyper, MnemonicNetwork, NeuralImmHyper,
+    Normalisation, ResidualNetwork, Sign, TrMttHyper, TransformerNetwork,
 };
 use tercel_neural::{Card, Model, Tensor};
 
@@ -60,6 +65,45 @@ pub fn small_bank() -> NeuralImmHyper {
     }
 }
 
+/// An ensemble with random weights.
+pub fn ensemble_model(hyper: &EnsKNetsHyper, size: f32, seed: u64) -> Model {
+    let mut card = Card::new("untrained", "ens-knets", &STATE);
+    card.hyper = hyper.to_table().unwrap();
+    card.scales = EnsKNetsHyper::default_scales();
+    for index in 0..hyper.modes() {
+        let scales = KalmanNetHyper::default_scales().into_iter();
+        card.scales.extend(scales.map(|(name, scale)| (format!("net.{index}.{name}"), scale)));
+    }
+    Model::new(card, weights(hyper.tensors(), size, seed)).unwrap()
+}
+
+pub fn ensemble(hyper: &EnsKNetsHyper, size: f32) -> Arc<EnsembleNetwork> {
+    Arc::new(EnsembleNetwork::from_model(&ensemble_model(hyper, size, 1)).unwrap())
+}
+
+/// Two KalmanNets that differ and small branches that differ, without attention, for slow objects.
+pub fn tiny_ensemble() -> EnsKNetsHyper {
+    EnsKNetsHyper {
+        rates: vec![0.02, -0.03],
+        acceleration: 1.0,
+        speed: 20.0,
+        normalisation: Normalisation::Running,
+        attention: None,
+        correction: Some(BranchHyper { hidden: 6, layers: 2 }),
+        classification: Some(BranchHyper { hidden: 5, layers: 1 }),
+        nets: [TINY_ONE, TINY_TWO].map(|a| tiny(a, Covariance::Joseph)).into(),
+    }
+}
+
+/// The same with all that is ours.
+pub fn tiny_attention() -> EnsKNetsHyper {
+    EnsKNetsHyper {
+        normalisation: Normalisation::Relative,
+        attention: Some(Attention { sign: Sign::Minus, temperature: Some(0.9), stay: Some(0.95) }),
+        ..tiny_ensemble()
+    }
+}
+
 pub fn network(hyper: &KalmanNetHyper, size: f32) -> Arc<GainNetwork> {
     Arc::new(GainNetwork::from_model(&kalman_net(hyper, size, 1)).unwrap())
 }
@@ -78,3 +122,61 @@ pub fn tiny(architecture: Architecture, covariance: Covariance) -> KalmanNetHype
 
 pub const TINY_ONE: Architecture = Architecture::Stacked { input: 12, hidden: 9, layers: 2, head: 5 };
 pub const TINY_TWO: Architecture = Architecture::Branched { in_mult: 2, out_mult: 3 };
+
+/// An aircraft that turns at this rate, 40 km from the radar, which misses every fifth plot.
+pub fn plots(rate: f64) -> Vec<Option<Measurement<2>>> {
+    let turn = Turn::new(rate, 0.0);
+    let mut state = Vector4::new(40e3, 9e3, -120.0, 150.0);
+    (0..50)
+        .map(|second| {
+            let error = f64::from(second * 7 % 11 - 5);
+            let plot = [state.xy().norm() + 8.0 * error, f64::atan2(state[1], state[0]) - 4e-4 * error];
+            state = turn.transition(&state, 1.0);
+            (second % 5 != 3).then(|| plot.into())
+        })
+        .collect()
+}
+
+pub fn radar() -> ConvertedPolar {
+    ConvertedPolar::new(50.0, 0.003).unwrap()
+}
+
+/// A model with random weights of any kind.
+pub fn model(kind: &str, hyper: toml::Table, tensors: Vec<(String, Vec<usize>)>, size: f32) -> Model {
+    let mut card = Card::new("untrained", kind, &STATE);
+    card.hyper = hyper;
+    Model::new(card, weights(tensors, size, 1)).unwrap()
+}
+
+/// A mnemonic network with random weights.
+pub fn mnemonic(hyper: &MnemonicHyper, size: f32) -> Arc<MnemonicNetwork> {
+    let model = model("mnemonic", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(MnemonicNetwork::from_model(&model).unwrap())
+}
+
+/// A residual network with random weights.
+pub fn deep_mtt(hyper: &DeepMttHyper, size: f32) -> Arc<ResidualNetwork> {
+    let model = model("deep-mtt", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(ResidualNetwork::from_model(&model).unwrap())
+}
+
+/// A transformer with random weights.
+pub fn tr_mtt(hyper: &TrMttHyper, size: f32) -> Arc<TransformerNetwork> {
+    let model = model("tr-mtt", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(TransformerNetwork::from_model(&model).unwrap())
+}
+
+/// Sizes for the objects of the conformance suite.
+pub fn small_mnemonic() -> MnemonicHyper {
+    MnemonicHyper { hidden: 5, acceleration: 1.0, speed: 20.0, ..MnemonicHyper::default() }
+}
+
+pub fn small_deep_mtt() -> DeepMttHyper {
+    DeepMttHyper { layers: vec![5, 4], dense: 3, acceleration: 1.0, speed: 20.0, ..DeepMttHyper::default() }
+}
+
+pub fn small_tr_mtt() -> TrMttHyper {
+    let sizes =
+        TrMttHyper { window: 6, size: 8, heads: 2, encoder: 1, decoder: 1, feed: 9, ..TrMttHyper::default() };
+    TrMttHyper { acceleration: 1.0, speed: 20.0, ..sizes }
+}

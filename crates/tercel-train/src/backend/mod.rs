@@ -1,11 +1,13 @@
 //! The only module that names burn.
 //!
-//! Its interface changes every few months, so everything else in this crate is written against what stands here: tensors
-//! of two dimensions on one device, leaves whose gradients are wanted, and operations with a backward of our own
-//! ([`Operation`]). Shapes are checked by the layers and tasks before they reach burn, which panics on a mismatch.
+//! Its interface changes every few months, so everything else in this crate is written against what stands
+//! here: tensors of two dimensions on one device, leaves whose gradients are wanted, and operations with a
+//! backward of our own ([`Operation`]). Shapes are checked by the layers and tasks before they reach burn,
+//! which panics on a mismatch.
 //!
-//! Operations run on the calling thread. Data parallelism is the trainer's (each shard of a batch has a thread and a graph
-//! of its own); a product that split itself over threads as well would only compete with that.
+//! Operations run on the calling thread. Data parallelism is the trainer's (each shard of a batch has a
+//! thread and a graph of its own); a product that split itself over threads as well would only compete with
+//! that.
 
 mod operation;
 pub(crate) mod product;
@@ -24,7 +26,8 @@ pub fn device() -> Device {
     Device::flex()
 }
 
-/// A constant: values in row-major order, of which no gradient is taken. Operations on constants alone are not recorded.
+/// A constant: values in row-major order, of which no gradient is taken. Operations on constants alone are
+/// not recorded.
 ///
 /// # Panics
 ///

@@ -46,7 +46,8 @@ impl Matrix {
     }
 }
 
-/// What the forward pass of an [`Operation`] gives: the value, and what its backward pass needs besides the inputs.
+/// What the forward pass of an [`Operation`] gives: the value, and what its backward pass needs besides the
+/// inputs.
 #[derive(Debug)]
 pub struct Forward<S> {
     /// Values in row-major order.
@@ -72,9 +73,9 @@ pub struct Past<'a, S, const N: usize> {
 
 /// An operation on `N` matrices with one matrix as its value, and a backward pass written by hand.
 ///
-/// Worth its code where a composition of small operations is slow: a recurrent layer over a whole sequence, or a step that
-/// is taken at every time of a recursion. Its gradient is checked against differences in the tests of its module. An
-/// operation with several values puts them side by side, and slices take them apart.
+/// Worth its code where a composition of small operations is slow: a recurrent layer over a whole sequence,
+/// or a step that is taken at every time of a recursion. Its gradient is checked against differences in the
+/// tests of its module. An operation with several values puts them side by side, and slices take them apart.
 pub trait Operation<const N: usize>: Debug + Clone + Send + 'static {
     /// What the backward pass needs besides the inputs.
     type Saved: Debug + Clone + Send + 'static;

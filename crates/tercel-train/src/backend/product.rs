@@ -1,13 +1,14 @@
 //! Matrix products on slices in row-major order.
 //!
-//! `nalgebra` wraps the kernels of `matrixmultiply`, which choose their instructions at run time, behind views that check
-//! their bounds. A matrix in rows is its transpose in columns, so the transposed product is computed, with a result in the
-//! layout that `nalgebra` expects: for products with a dimension of five or fewer, its own loops write past the end of a
-//! result that is laid out otherwise (0.35). Those loops are slow for rows in memory too, so such products have loops here.
+//! `nalgebra` wraps the kernels of `matrixmultiply`, which choose their instructions at run time, behind
+//! views that check their bounds. A matrix in rows is its transpose in columns, so the transposed product is
+//! computed, with a result in the layout that `nalgebra` expects: for products with a dimension of five or
+//! fewer, its own loops write past the end of a result that is laid out otherwise (0.35). Those loops are
+//! slow for rows in memory too, so such products have loops here.
 
 use nalgebra::{Dyn, MatrixView, MatrixViewMut};
 
-use super::vector::dispatch;
+use super::vector::vectorised;
 
 type View<'a> = MatrixView<'a, f32, Dyn, Dyn, Dyn, Dyn>;
 type ViewMut<'a> = MatrixViewMut<'a, f32, Dyn, Dyn, Dyn, Dyn>;
@@ -37,61 +38,64 @@ pub fn add_product(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3])
         add_transposes(out, &transposed(b, k, n), &transposed(a, m, k), [m, n]);
     } else if n <= NARROW {
         let columns = transpose(b, k, n);
-        dispatch(add_dots, (out, a, columns.as_slice(), [k, n]));
+        add_dots(out, a, &columns, [k, n]);
     } else {
-        dispatch(add_scaled_rows, (out, a, b, [k, n]));
+        add_scaled_rows(out, a, b, [k, n]);
     }
 }
 
-/// Adds `a b^T` to `out`, with `a` of `m x k` and `b` of `n x k`: the gradient of the left factor of a product.
+/// Adds `a b^T` to `out`, with `a` of `m x k` and `b` of `n x k`: the gradient of the left factor of a
+/// product.
 pub fn add_product_transposed(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3]) {
     if m.min(k).min(n) > NARROW {
         add_transposes(out, &plain(b, n, k), &transposed(a, m, k), [m, n]);
     } else if n <= NARROW {
-        dispatch(add_dots, (out, a, b, [k, n]));
+        add_dots(out, a, b, [k, n]);
     } else {
         let rows = transpose(b, n, k);
         add_product(out, a, &rows, [m, k, n]);
     }
 }
 
-/// Adds `a^T b` to `out`, with `a` of `k x m` and `b` of `k x n`: the gradient of the right factor of a product.
+/// Adds `a^T b` to `out`, with `a` of `k x m` and `b` of `k x n`: the gradient of the right factor of a
+/// product.
 pub fn add_transposed_product(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3]) {
     if m.min(k).min(n) > NARROW {
         add_transposes(out, &transposed(b, k, n), &plain(a, k, m), [m, n]);
     } else if n < m {
         // The wider of the two is that along which the inner loop runs.
         let mut turned = vec![0.0; n * m];
-        dispatch(add_outer_products, (turned.as_mut_slice(), b, a, [n, m]));
+        add_outer_products(&mut turned, b, a, [n, m]);
         for (row, out) in out.chunks_exact_mut(n).enumerate() {
             for (column, out) in out.iter_mut().enumerate() {
                 *out += turned[column * m + row];
             }
         }
     } else {
-        dispatch(add_outer_products, (out, a, b, [m, n]));
+        add_outer_products(out, a, b, [m, n]);
     }
 }
 
-/// The result, two factors, and two dimensions.
-type Factors<'a> = (&'a mut [f32], &'a [f32], &'a [f32], [usize; 2]);
-
-/// Adds to each row the rows of `b`, scaled by that of `a`.
-#[inline(always)]
-fn add_scaled_rows((out, a, b, [k, n]): Factors<'_>) {
-    for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
-        for (&factor, b) in a.iter().zip(b.chunks_exact(n)) {
-            add_scaled(out, factor, b);
+vectorised! {
+    /// Adds to each row the rows of `b`, scaled by that of `a`.
+    fn add_scaled_rows<'a>(out: &'a mut [f32], a: &'a [f32], b: &'a [f32], sizes: [usize; 2]) {
+        let [k, n] = sizes;
+        for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
+            for (&factor, b) in a.iter().zip(b.chunks_exact(n)) {
+                add_scaled(out, factor, b);
+            }
         }
     }
 }
 
-/// Adds the outer products of the rows of `a` with those of `b`.
-#[inline(always)]
-fn add_outer_products((out, a, b, [m, n]): Factors<'_>) {
-    for (a, b) in a.chunks_exact(m).zip(b.chunks_exact(n)) {
-        for (&factor, out) in a.iter().zip(out.chunks_exact_mut(n)) {
-            add_scaled(out, factor, b);
+vectorised! {
+    /// Adds the outer products of the rows of `a` with those of `b`.
+    fn add_outer_products<'a>(out: &'a mut [f32], a: &'a [f32], b: &'a [f32], sizes: [usize; 2]) {
+        let [m, n] = sizes;
+        for (a, b) in a.chunks_exact(m).zip(b.chunks_exact(n)) {
+            for (&factor, out) in a.iter().zip(out.chunks_exact_mut(n)) {
+                add_scaled(out, factor, b);
+            }
         }
     }
 }
@@ -103,19 +107,22 @@ fn add_scaled(out: &mut [f32], factor: f32, values: &[f32]) {
     }
 }
 
-/// Adds the inner products of the rows of `a` with those of `b`.
-#[inline(always)]
-fn add_dots((out, a, b, [k, n]): Factors<'_>) {
-    for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
-        for (out, b) in out.iter_mut().zip(b.chunks_exact(k)) {
-            *out += dot(a, b);
+vectorised! {
+    /// Adds the inner products of the rows of `a` with those of `b`.
+    fn add_dots<'a>(out: &'a mut [f32], a: &'a [f32], b: &'a [f32], sizes: [usize; 2]) {
+        let [k, n] = sizes;
+        for (out, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(k)) {
+            for (out, b) in out.iter_mut().zip(b.chunks_exact(k)) {
+                *out += dot(a, b);
+            }
         }
     }
 }
 
 #[inline(always)]
 fn dot(a: &[f32], b: &[f32]) -> f32 {
-    // Eight sums side by side, as a vector has them; one sum could not be vectorised without changing its rounding.
+    // Eight sums side by side, as a vector has them; one sum could not be vectorised without changing its
+    // rounding.
     let mut sums = [0.0_f32; 8];
     let (a_whole, a_rest) = a.as_chunks::<8>();
     let (b_whole, b_rest) = b.as_chunks::<8>();

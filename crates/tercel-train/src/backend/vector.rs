@@ -1,28 +1,62 @@
 //! Passes over long vectors, with the widest instructions that the machine has.
 //!
-//! The functions are plain loops that the compiler turns into vector instructions; `pulp` chooses at run time between the
-//! versions for different machines. Products and sums are not contracted, so that every machine gives the same numbers.
+//! The functions are plain loops that the compiler turns into vector instructions; `pulp` chooses at run time
+//! between the versions for different machines. Products and sums are not contracted, so that every machine
+//! gives the same numbers.
 
 use pulp::{Arch, NullaryFnOnce};
 
-/// Runs a kernel in the version for this machine.
-///
-/// The kernel must be a function with `#[inline(always)]`, and so must be what it calls: what is not inlined is compiled for
-/// the oldest machine. A closure cannot promise that.
-pub fn dispatch<A, R>(kernel: impl FnOnce(A) -> R, arguments: A) -> R {
-    Arch::new().dispatch(Call(kernel, arguments))
+/// What is compiled once for each kind of machine. Made by [`vectorised`].
+pub trait Kernel {
+    /// Runs it.
+    fn run(self);
 }
 
-struct Call<K, A>(K, A);
+/// Runs a kernel in the version for this machine.
+#[inline(always)]
+pub fn dispatch(kernel: impl Kernel) {
+    Arch::new().dispatch(Call(kernel));
+}
 
-impl<A, R, K: FnOnce(A) -> R> NullaryFnOnce for Call<K, A> {
-    type Output = R;
+struct Call<K>(K);
+
+impl<K: Kernel> NullaryFnOnce for Call<K> {
+    type Output = ();
 
     #[inline(always)]
-    fn call(self) -> R {
-        (self.0)(self.1)
+    fn call(self) {
+        self.0.run();
     }
 }
+
+/// Makes a function a [`Kernel`] and calls it through [`dispatch`].
+///
+/// What its body calls must be `#[inline(always)]`: what is not inlined is compiled for the oldest machine.
+/// Closures and functions that are passed as values cannot promise that, methods of a trait can; hence the
+/// macro.
+macro_rules! vectorised {
+    (
+        $(#[$doc:meta])*
+        $view:vis fn $name:ident<$life:lifetime>($($argument:ident: $type:ty),* $(,)?) $body:block
+    ) => {
+        $(#[$doc])*
+        $view fn $name<$life>($($argument: $type),*) {
+            struct Arguments<$life> {
+                $($argument: $type),*
+            }
+            impl<$life> $crate::backend::vector::Kernel for Arguments<$life> {
+                #[inline(always)]
+                fn run(self) {
+                    let Self { $($argument),* } = self;
+                    $body
+                }
+            }
+            $crate::backend::vector::dispatch(Arguments { $($argument),* });
+        }
+    };
+}
+
+pub(crate) use vectorised;
 
 /// `exp(x)` to about 1e-7 relative, for x held within +-87: 2^n times a polynomial in the remainder.
 #[inline(always)]
@@ -62,26 +96,26 @@ pub fn tanh(x: f32) -> f32 {
 /// Sums the rows of a matrix: the gradient of a bias.
 pub fn sum_rows(values: &[f32], columns: usize) -> Vec<f32> {
     let mut sums = vec![0.0; columns];
-    dispatch(sum_rows_kernel, (sums.as_mut_slice(), values));
+    add_rows(&mut sums, values);
     sums
 }
 
-#[inline(always)]
-fn sum_rows_kernel((sums, values): (&mut [f32], &[f32])) {
-    for row in values.chunks_exact(sums.len()) {
-        add_kernel((sums, row));
+vectorised! {
+    fn add_rows<'a>(sums: &'a mut [f32], values: &'a [f32]) {
+        for row in values.chunks_exact(sums.len()) {
+            for (sum, value) in sums.iter_mut().zip(row) {
+                *sum += value;
+            }
+        }
     }
 }
 
-/// Adds numbers to others.
-pub fn add(out: &mut [f32], values: &[f32]) {
-    dispatch(add_kernel, (out, values));
-}
-
-#[inline(always)]
-fn add_kernel((out, values): (&mut [f32], &[f32])) {
-    for (out, value) in out.iter_mut().zip(values) {
-        *out += value;
+vectorised! {
+    /// Adds numbers to others.
+    pub fn add<'a>(out: &'a mut [f32], values: &'a [f32]) {
+        for (out, value) in out.iter_mut().zip(values) {
+            *out += value;
+        }
     }
 }
 

@@ -14,8 +14,8 @@ use crate::backend::{Tensor, constant};
 ///
 /// ## Reference
 ///
-/// N. Srivastava et al., "Dropout: a simple way to prevent neural networks from overfitting", JMLR 15 (2014), in the
-/// inverted form that leaves the run time as it is.
+/// N. Srivastava et al., "Dropout: a simple way to prevent neural networks from overfitting", JMLR 15 (2014),
+/// in the inverted form that leaves the run time as it is.
 pub fn dropout(x: Tensor, probability: f32, random: &mut impl Rng) -> Tensor {
     if probability <= 0.0 {
         return x;

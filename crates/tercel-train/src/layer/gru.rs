@@ -2,7 +2,7 @@
 
 use super::positive;
 use crate::backend::product::{add_product, add_product_transposed, add_transposed_product};
-use crate::backend::vector::{add, dispatch, repeat_row, sigmoid, sum_rows, tanh};
+use crate::backend::vector::{add, repeat_row, sigmoid, sum_rows, tanh, vectorised};
 use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply, constant};
 use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 
@@ -16,14 +16,14 @@ use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 /// n = tanh(xn + r hn)               h_t = (1 - z) n + z h_{t-1}
 /// ```
 ///
-/// Parameters: `NAME.input [inputs, 3h]`, `NAME.input_bias [3h]`, `NAME.hidden [h, 3h]`, `NAME.hidden_bias [3h]`, all
-/// uniform in `+-1/sqrt(h)` as in PyTorch. A whole sequence is one operation with a backward pass of its own, and so is a
-/// single step.
+/// Parameters: `NAME.input [inputs, 3h]`, `NAME.input_bias [3h]`, `NAME.hidden [h, 3h]`, `NAME.hidden_bias
+/// [3h]`, all uniform in `+-1/sqrt(h)` as in PyTorch. A whole sequence is one operation with a backward pass
+/// of its own, and so is a single step.
 ///
 /// ## Reference
 ///
-/// K. Cho et al., "Learning phrase representations using RNN encoder-decoder", EMNLP 2014; the reset gate is applied after
-/// the product with `U`, as cuDNN and PyTorch have it.
+/// K. Cho et al., "Learning phrase representations using RNN encoder-decoder", EMNLP 2014; the reset gate is
+/// applied after the product with `U`, as cuDNN and PyTorch have it.
 #[derive(Debug, Clone)]
 pub struct Gru {
     input: ParameterId,
@@ -65,8 +65,8 @@ impl Gru {
 
     /// The outputs `[steps * batch, h]` of a sequence that goes on from a memory `[batch, h]`.
     ///
-    /// The memory after it is the last `batch` rows. Of one step, the output is the memory after it, so this also is the
-    /// step of a recursion in which the output feeds back.
+    /// The memory after it is the last `batch` rows. Of one step, the output is the memory after it, so this
+    /// also is the step of a recursion in which the output feeds back.
     pub fn forward(&self, weights: &Weights, x: Tensor, memory: Tensor) -> Tensor {
         let [input, input_bias, hidden, hidden_bias] =
             [self.input, self.input_bias, self.hidden, self.hidden_bias].map(|id| weights.get(id));
@@ -130,8 +130,7 @@ impl Operation<6> for Sequence {
             }
             add_product(&mut recurrent, before, hidden.values(), [sizes.batch, size, 3 * size]);
             let gates = &mut gates[3 * here.start..3 * here.end];
-            let out = (&mut candidates[here], &mut rest[..state]);
-            dispatch(advance, (gates, &recurrent, before, out, size));
+            advance(gates, &recurrent, before, &mut candidates[here], &mut rest[..state], size);
         }
         Forward { values: outputs, shape: [sizes.rows(), size], saved: Saved { gates, candidates } }
     }
@@ -151,11 +150,10 @@ impl Operation<6> for Sequence {
             let wide = 3 * here.start..3 * here.end;
             add(&mut of_memory, &gradient[here.clone()]);
             let (before, candidates) = (&before_all[here.clone()], &candidates[here]);
-            let changed = (of_memory.as_mut_slice(), &mut of_recurrent[wide.clone()]);
-            let gates = &mut gates[wide.clone()];
-            dispatch(retreat, (gates, before, candidates, changed.0, changed.1, size));
+            let of_recurrent = &mut of_recurrent[wide.clone()];
+            retreat(&mut gates[wide], before, candidates, &mut of_memory, of_recurrent, size);
             let sizes = [sizes.batch, 3 * size, size];
-            add_product_transposed(&mut of_memory, &of_recurrent[wide], hidden.values(), sizes);
+            add_product_transposed(&mut of_memory, of_recurrent, hidden.values(), sizes);
         }
         let of_x = past.wanted[0].then(|| {
             let mut out = vec![0.0; rows * sizes.inputs];
@@ -178,62 +176,75 @@ impl Operation<6> for Sequence {
     }
 }
 
-/// Gates, `(hr, hz, hn)`, the memory before the step, and to be filled: `hn` and outputs; then the number of units.
-type Advance<'a> = (&'a mut [f32], &'a [f32], &'a [f32], (&'a mut [f32], &'a mut [f32]), usize);
-
-/// One step of the batch: turns what the input contributes to the gates into `r`, `z`, `n`, and fills `hn` and outputs.
-#[inline(always)]
-fn advance((gates, recurrent, before, (candidates, outputs), size): Advance<'_>) {
-    let rows = gates.chunks_exact_mut(3 * size).zip(recurrent.chunks_exact(3 * size));
-    let out = candidates.chunks_exact_mut(size).zip(outputs.chunks_exact_mut(size));
-    for (((gates, recurrent), before), (candidate, output)) in rows.zip(before.chunks_exact(size)).zip(out) {
-        let (gated, n) = gates.split_at_mut(2 * size);
-        let (of_gates, of_candidate) = recurrent.split_at(2 * size);
-        for (gate, h) in gated.iter_mut().zip(of_gates) {
-            *gate = sigmoid(*gate + h);
-        }
-        candidate.copy_from_slice(of_candidate);
-        let (r, z) = gated.split_at(size);
-        let (r, z, n, candidate) = (&r[..size], &z[..size], &mut n[..size], &candidate[..size]);
-        for k in 0..size {
-            n[k] = tanh(n[k] + r[k] * candidate[k]);
-        }
-        let (before, output) = (&before[..size], &mut output[..size]);
-        for k in 0..size {
-            output[k] = n[k] + z[k] * (before[k] - n[k]);
+vectorised! {
+    /// One step of the batch: turns what the input contributes to the gates into `r`, `z`, `n`, and fills
+    /// `hn` and outputs.
+    fn advance<'a>(
+        gates: &'a mut [f32],
+        recurrent: &'a [f32],
+        before: &'a [f32],
+        candidates: &'a mut [f32],
+        outputs: &'a mut [f32],
+        size: usize,
+    ) {
+        let rows = gates.chunks_exact_mut(3 * size).zip(recurrent.chunks_exact(3 * size));
+        let out = candidates.chunks_exact_mut(size).zip(outputs.chunks_exact_mut(size));
+        let rows = rows.zip(before.chunks_exact(size));
+        for (((gates, recurrent), before), (candidate, output)) in rows.zip(out) {
+            let (gated, n) = gates.split_at_mut(2 * size);
+            let (of_gates, of_candidate) = recurrent.split_at(2 * size);
+            for (gate, h) in gated.iter_mut().zip(of_gates) {
+                *gate = sigmoid(*gate + h);
+            }
+            candidate.copy_from_slice(of_candidate);
+            let (r, z) = gated.split_at(size);
+            let (r, z, n, candidate) = (&r[..size], &z[..size], &mut n[..size], &candidate[..size]);
+            for k in 0..size {
+                n[k] = tanh(n[k] + r[k] * candidate[k]);
+            }
+            let (before, output) = (&before[..size], &mut output[..size]);
+            for k in 0..size {
+                output[k] = n[k] + z[k] * (before[k] - n[k]);
+            }
         }
     }
 }
 
-/// Gates, the memory before the step, `hn`, and to be changed: the gradients of the memory and of `(hr, hz, hn)`; then the
-/// number of units.
-type Retreat<'a> = (&'a mut [f32], &'a [f32], &'a [f32], &'a mut [f32], &'a mut [f32], usize);
-
-/// One step of the batch backwards: turns gates into the gradients of `xr`, `xz`, `xn`, fills those of `hr`, `hz`, `hn`,
-/// and leaves in `of_memory` what flows to the memory before the step past the product with `U`.
-#[inline(always)]
-fn retreat((gates, before, candidates, of_memory, of_recurrent, size): Retreat<'_>) {
-    let known = before.chunks_exact(size).zip(candidates.chunks_exact(size));
-    let found = of_memory.chunks_exact_mut(size).zip(of_recurrent.chunks_exact_mut(3 * size));
-    for ((gates, (before, candidate)), (of_memory, of_recurrent)) in
-        gates.chunks_exact_mut(3 * size).zip(known).zip(found)
-    {
-        let (r, rest) = gates.split_at_mut(size);
-        let (z, n) = rest.split_at_mut(size);
-        let (r, z, n) = (&mut r[..size], &mut z[..size], &mut n[..size]);
-        let (before, candidate, of_memory) = (&before[..size], &candidate[..size], &mut of_memory[..size]);
-        for k in 0..size {
-            let (gate, value, slope) = (z[k], n[k], of_memory[k]);
-            n[k] = slope * (1.0 - gate) * (1.0 - value * value);
-            z[k] = slope * (before[k] - value) * gate * (1.0 - gate);
-            of_memory[k] = slope * gate;
+vectorised! {
+    /// One step of the batch backwards: turns gates into the gradients of `xr`, `xz`, `xn`, fills those of
+    /// `hr`, `hz`, `hn`, and leaves in `of_memory` what flows to the memory before the step past the product
+    /// with `U`.
+    fn retreat<'a>(
+        gates: &'a mut [f32],
+        before: &'a [f32],
+        candidates: &'a [f32],
+        of_memory: &'a mut [f32],
+        of_recurrent: &'a mut [f32],
+        size: usize,
+    ) {
+        let known = before.chunks_exact(size).zip(candidates.chunks_exact(size));
+        let found = of_memory.chunks_exact_mut(size).zip(of_recurrent.chunks_exact_mut(3 * size));
+        for ((gates, (before, candidate)), (of_memory, of_recurrent)) in
+            gates.chunks_exact_mut(3 * size).zip(known).zip(found)
+        {
+            let (r, rest) = gates.split_at_mut(size);
+            let (z, n) = rest.split_at_mut(size);
+            let (r, z, n) = (&mut r[..size], &mut z[..size], &mut n[..size]);
+            let (before, candidate) = (&before[..size], &candidate[..size]);
+            let of_memory = &mut of_memory[..size];
+            for k in 0..size {
+                let (gate, value, slope) = (z[k], n[k], of_memory[k]);
+                n[k] = slope * (1.0 - gate) * (1.0 - value * value);
+                z[k] = slope * (before[k] - value) * gate * (1.0 - gate);
+                of_memory[k] = slope * gate;
+            }
+            let of_candidate = &mut of_recurrent[2 * size..][..size];
+            for k in 0..size {
+                let gate = r[k];
+                of_candidate[k] = n[k] * gate;
+                r[k] = n[k] * candidate[k] * gate * (1.0 - gate);
+            }
+            of_recurrent[..2 * size].copy_from_slice(&gates[..2 * size]);
         }
-        let of_candidate = &mut of_recurrent[2 * size..][..size];
-        for k in 0..size {
-            let gate = r[k];
-            of_candidate[k] = n[k] * gate;
-            r[k] = n[k] * candidate[k] * gate * (1.0 - gate);
-        }
-        of_recurrent[..2 * size].copy_from_slice(&gates[..2 * size]);
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::positive;
 use crate::backend::product::{add_product, add_product_transposed, add_transposed_product};
-use crate::backend::vector::{dispatch, repeat_row, sigmoid, sum_rows, tanh};
+use crate::backend::vector::{repeat_row, sigmoid, sum_rows, tanh, vectorised};
 use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply};
 use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 
@@ -27,65 +27,72 @@ impl Activation {
     fn apply(self, values: &mut [f32]) {
         match self {
             Self::Identity => {}
-            Self::Relu => dispatch(relu, values),
-            Self::Tanh => dispatch(all_tanh, values),
-            Self::Sigmoid => dispatch(all_sigmoid, values),
+            Self::Relu => relu(values),
+            Self::Tanh => all_tanh(values),
+            Self::Sigmoid => all_sigmoid(values),
         }
     }
 
-    /// Turns the gradient with respect to the output into that with respect to what the activation was applied to.
+    /// Turns the gradient with respect to the output into that with respect to what the activation was
+    /// applied to.
     fn backward(self, value: &[f32], gradient: &[f32]) -> Vec<f32> {
         let mut inner = gradient.to_vec();
         match self {
             Self::Identity => {}
-            Self::Relu => dispatch(relu_slope, (inner.as_mut_slice(), value)),
-            Self::Tanh => dispatch(tanh_slope, (inner.as_mut_slice(), value)),
-            Self::Sigmoid => dispatch(sigmoid_slope, (inner.as_mut_slice(), value)),
+            Self::Relu => relu_slope(&mut inner, value),
+            Self::Tanh => tanh_slope(&mut inner, value),
+            Self::Sigmoid => sigmoid_slope(&mut inner, value),
         }
         inner
     }
 }
 
-#[inline(always)]
-fn relu(values: &mut [f32]) {
-    for x in values {
-        // Not `max`, which would turn what is not a number into zero and hide it.
-        *x = if *x < 0.0 { 0.0 } else { *x };
+vectorised! {
+    fn relu<'a>(values: &'a mut [f32]) {
+        for x in values {
+            // Not `max`, which would turn what is not a number into zero and hide it.
+            *x = if *x < 0.0 { 0.0 } else { *x };
+        }
     }
 }
 
-#[inline(always)]
-fn all_tanh(values: &mut [f32]) {
-    for x in values {
-        *x = tanh(*x);
+vectorised! {
+    fn all_tanh<'a>(values: &'a mut [f32]) {
+        for x in values {
+            *x = tanh(*x);
+        }
     }
 }
 
-#[inline(always)]
-fn all_sigmoid(values: &mut [f32]) {
-    for x in values {
-        *x = sigmoid(*x);
+vectorised! {
+    fn all_sigmoid<'a>(values: &'a mut [f32]) {
+        for x in values {
+            *x = sigmoid(*x);
+        }
     }
 }
 
-#[inline(always)]
-fn relu_slope((gradient, value): (&mut [f32], &[f32])) {
-    for (g, y) in gradient.iter_mut().zip(value) {
-        *g = if *y > 0.0 { *g } else { 0.0 };
+vectorised! {
+    fn relu_slope<'a>(gradient: &'a mut [f32], value: &'a [f32]) {
+        for (g, y) in gradient.iter_mut().zip(value) {
+            *g = if *y > 0.0 { *g } else { 0.0 };
+        }
     }
 }
 
-#[inline(always)]
-fn tanh_slope((gradient, value): (&mut [f32], &[f32])) {
-    for (g, y) in gradient.iter_mut().zip(value) {
-        *g *= 1.0 - y * y;
+vectorised! {
+    fn tanh_slope<'a>(gradient: &'a mut [f32], value: &'a [f32]) {
+        for (g, y) in gradient.iter_mut().zip(value) {
+            *g *= 1.0 - y * y;
+        }
     }
 }
 
-#[inline(always)]
-fn sigmoid_slope((gradient, value): (&mut [f32], &[f32])) {
-    for (g, y) in gradient.iter_mut().zip(value) {
-        *g *= y * (1.0 - y);
+vectorised! {
+    fn sigmoid_slope<'a>(gradient: &'a mut [f32], value: &'a [f32]) {
+        for (g, y) in gradient.iter_mut().zip(value) {
+            *g *= y * (1.0 - y);
+        }
     }
 }
 

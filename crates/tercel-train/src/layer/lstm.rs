@@ -2,7 +2,7 @@
 
 use super::positive;
 use crate::backend::product::{add_product, add_product_transposed, add_transposed_product};
-use crate::backend::vector::{add, dispatch, repeat_row, sigmoid, sum_rows, tanh};
+use crate::backend::vector::{add, repeat_row, sigmoid, sum_rows, tanh, vectorised};
 use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply, constant, detached};
 use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 
@@ -16,13 +16,14 @@ use crate::{Initial, ParameterId, ParameterSet, TrainError, Weights};
 /// h_t = sigmoid(o) tanh(c_t)
 /// ```
 ///
-/// Parameters: `NAME.input [inputs, 4h]`, `NAME.hidden [h, 4h]`, `NAME.bias [4h]`, all uniform in `+-1/sqrt(h)` as in
-/// PyTorch, whose two biases are one here. The whole sequence is one operation with a backward pass of its own.
+/// Parameters: `NAME.input [inputs, 4h]`, `NAME.hidden [h, 4h]`, `NAME.bias [4h]`, all uniform in
+/// `+-1/sqrt(h)` as in PyTorch, whose two biases are one here. The whole sequence is one operation with a
+/// backward pass of its own.
 ///
 /// ## Reference
 ///
-/// S. Hochreiter, J. Schmidhuber, "Long short-term memory", Neural Computation 9 (1997); forget gate of F. Gers et al.
-/// (2000).
+/// S. Hochreiter, J. Schmidhuber, "Long short-term memory", Neural Computation 9 (1997); forget gate of F.
+/// Gers et al. (2000).
 #[derive(Debug, Clone)]
 pub struct Lstm {
     input: ParameterId,
@@ -80,7 +81,8 @@ impl Lstm {
         self.run(weights, x, LstmState::zero(batch, self.size), Pass::default())
     }
 
-    /// As [`sequence`](Self::sequence), from the last step to the first: the other half of a bidirectional layer.
+    /// As [`sequence`](Self::sequence), from the last step to the first: the other half of a bidirectional
+    /// layer.
     pub fn reversed(&self, weights: &Weights, x: Tensor, batch: usize) -> Tensor {
         self.run(weights, x, LstmState::zero(batch, self.size), Pass { reversed: true, with_cell: false })
     }
@@ -95,7 +97,8 @@ impl Lstm {
         (outputs, LstmState { hidden, cell: all.narrow(0, rows, batch) })
     }
 
-    /// One step, for recursions in which the output feeds back: the memory after it, whose `hidden` is the output.
+    /// One step, for recursions in which the output feeds back: the memory after it, whose `hidden` is the
+    /// output.
     pub fn step(&self, weights: &Weights, x: Tensor, state: LstmState) -> LstmState {
         let [batch, _] = state.hidden.dims();
         let both = self.run(weights, x, state, Pass { reversed: false, with_cell: true });
@@ -184,9 +187,9 @@ impl Operation<6> for Sequence {
             let last = before.map_or(first_hidden.values(), |before| &outputs[before * state..][..state]);
             let gates = &mut gates[4 * here.start..4 * here.end];
             add_product(gates, last, hidden.values(), [sizes.batch, size, 4 * size]);
-            let rows = (&mut cells[here.clone()], &mut bent[here.clone()], &mut outputs[here.clone()]);
-            dispatch(advance, (gates, previous.as_slice(), rows, size));
-            previous.copy_from_slice(&cells[here]);
+            let (cells, bent) = (&mut cells[here.clone()], &mut bent[here.clone()]);
+            advance(gates, &previous, cells, bent, &mut outputs[here], size);
+            previous.copy_from_slice(cells);
         }
         let mut rows = sizes.rows();
         if self.pass.with_cell {
@@ -216,7 +219,7 @@ impl Operation<6> for Sequence {
             before_all[here.clone()].copy_from_slice(last);
             add(&mut of_hidden, &gradient[here.clone()]);
             let gates = &mut gates[4 * here.start..4 * here.end];
-            dispatch(retreat, (&mut *gates, cell, &bent[here], &of_hidden, of_cell.as_mut_slice(), size));
+            retreat(gates, cell, &bent[here], &of_hidden, &mut of_cell, size);
             of_hidden.fill(0.0);
             add_product_transposed(&mut of_hidden, gates, hidden.values(), [sizes.batch, 4 * size, size]);
         }
@@ -241,77 +244,85 @@ impl Operation<6> for Sequence {
     }
 }
 
-/// Gates, cells before the step, and to be filled: cells, their tangents, outputs; then the number of units.
-type Advance<'a> = (&'a mut [f32], &'a [f32], (&'a mut [f32], &'a mut [f32], &'a mut [f32]), usize);
-
-/// One step of the batch: activates the gates in place and fills cells, their tangents and outputs.
-#[inline(always)]
-fn advance((gates, previous, (cells, bent, outputs), size): Advance<'_>) {
-    let rows = gates.chunks_exact_mut(4 * size).zip(previous.chunks_exact(size));
-    let out =
-        cells.chunks_exact_mut(size).zip(bent.chunks_exact_mut(size)).zip(outputs.chunks_exact_mut(size));
-    for ((gates, previous), ((cell, bent), output)) in rows.zip(out) {
-        // Separate passes: one loop over all slices is not vectorised.
-        let (i, rest) = gates.split_at_mut(size);
-        let (f, rest) = rest.split_at_mut(size);
-        let (g, o) = rest.split_at_mut(size);
-        for gate in i.iter_mut().chain(&mut *f) {
-            *gate = sigmoid(*gate);
-        }
-        for gate in &mut *g {
-            *gate = tanh(*gate);
-        }
-        for gate in &mut *o {
-            *gate = sigmoid(*gate);
-        }
-        let (i, f, g, o) = (&i[..size], &f[..size], &g[..size], &o[..size]);
-        let (previous, cell, bent, output) =
-            (&previous[..size], &mut cell[..size], &mut bent[..size], &mut output[..size]);
-        for k in 0..size {
-            cell[k] = f[k] * previous[k] + i[k] * g[k];
-        }
-        for k in 0..size {
-            bent[k] = tanh(cell[k]);
-        }
-        for k in 0..size {
-            output[k] = o[k] * bent[k];
+vectorised! {
+    /// One step of the batch: activates the gates in place and fills cells, their tangents and outputs.
+    fn advance<'a>(
+        gates: &'a mut [f32],
+        previous: &'a [f32],
+        cells: &'a mut [f32],
+        bent: &'a mut [f32],
+        outputs: &'a mut [f32],
+        size: usize,
+    ) {
+        let rows = gates.chunks_exact_mut(4 * size).zip(previous.chunks_exact(size));
+        let out =
+            cells.chunks_exact_mut(size).zip(bent.chunks_exact_mut(size)).zip(outputs.chunks_exact_mut(size));
+        for ((gates, previous), ((cell, bent), output)) in rows.zip(out) {
+            // Separate passes: one loop over all slices is not vectorised.
+            for gate in &mut gates[..2 * size] {
+                *gate = sigmoid(*gate);
+            }
+            for gate in &mut gates[2 * size..3 * size] {
+                *gate = tanh(*gate);
+            }
+            for gate in &mut gates[3 * size..] {
+                *gate = sigmoid(*gate);
+            }
+            let (i, f) = (&gates[..size], &gates[size..2 * size]);
+            let (g, o) = (&gates[2 * size..3 * size], &gates[3 * size..4 * size]);
+            let (previous, cell, bent, output) =
+                (&previous[..size], &mut cell[..size], &mut bent[..size], &mut output[..size]);
+            for k in 0..size {
+                cell[k] = f[k] * previous[k] + i[k] * g[k];
+            }
+            for k in 0..size {
+                bent[k] = tanh(cell[k]);
+            }
+            for k in 0..size {
+                output[k] = o[k] * bent[k];
+            }
         }
     }
 }
 
-/// Gates, cells before the step, tangents of those after it, gradients of outputs and cells, and the number of units.
-type Retreat<'a> = (&'a mut [f32], &'a [f32], &'a [f32], &'a [f32], &'a mut [f32], usize);
-
-/// One step of the batch backwards: turns gates into the gradients of what was in them before their activations, and the
-/// gradient of the cells after the step into that of the cells before it.
-#[inline(always)]
-fn retreat((gates, previous, bent, of_hidden, of_cell, size): Retreat<'_>) {
-    let known = previous.chunks_exact(size).zip(bent.chunks_exact(size));
-    let given = of_hidden.chunks_exact(size).zip(of_cell.chunks_exact_mut(size));
-    for ((gates, (previous, bent)), (of_hidden, of_cell)) in
-        gates.chunks_exact_mut(4 * size).zip(known).zip(given)
-    {
-        let (i, rest) = gates.split_at_mut(size);
-        let (f, rest) = rest.split_at_mut(size);
-        let (g, o) = rest.split_at_mut(size);
-        let (previous, bent) = (&previous[..size], &bent[..size]);
-        let (of_hidden, of_cell) = (&of_hidden[..size], &mut of_cell[..size]);
-        let (i, f, g, o) = (&mut i[..size], &mut f[..size], &mut g[..size], &mut o[..size]);
-        for k in 0..size {
-            of_cell[k] += of_hidden[k] * o[k] * (1.0 - bent[k] * bent[k]);
-        }
-        for k in 0..size {
-            o[k] = of_hidden[k] * bent[k] * o[k] * (1.0 - o[k]);
-        }
-        for k in 0..size {
-            let (gate, input) = (i[k], g[k]);
-            i[k] = of_cell[k] * input * gate * (1.0 - gate);
-            g[k] = of_cell[k] * gate * (1.0 - input * input);
-        }
-        for k in 0..size {
-            let gate = f[k];
-            f[k] = of_cell[k] * previous[k] * gate * (1.0 - gate);
-            of_cell[k] *= gate;
+vectorised! {
+    /// One step of the batch backwards: turns gates into the gradients of what was in them before their
+    /// activations, and the gradient of the cells after the step into that of the cells before it.
+    fn retreat<'a>(
+        gates: &'a mut [f32],
+        previous: &'a [f32],
+        bent: &'a [f32],
+        of_hidden: &'a [f32],
+        of_cell: &'a mut [f32],
+        size: usize,
+    ) {
+        let known = previous.chunks_exact(size).zip(bent.chunks_exact(size));
+        let given = of_hidden.chunks_exact(size).zip(of_cell.chunks_exact_mut(size));
+        for ((gates, (previous, bent)), (of_hidden, of_cell)) in
+            gates.chunks_exact_mut(4 * size).zip(known).zip(given)
+        {
+            let (i, rest) = gates.split_at_mut(size);
+            let (f, rest) = rest.split_at_mut(size);
+            let (g, o) = rest.split_at_mut(size);
+            let (previous, bent) = (&previous[..size], &bent[..size]);
+            let (of_hidden, of_cell) = (&of_hidden[..size], &mut of_cell[..size]);
+            let (i, f, g, o) = (&mut i[..size], &mut f[..size], &mut g[..size], &mut o[..size]);
+            for k in 0..size {
+                of_cell[k] += of_hidden[k] * o[k] * (1.0 - bent[k] * bent[k]);
+            }
+            for k in 0..size {
+                o[k] = of_hidden[k] * bent[k] * o[k] * (1.0 - o[k]);
+            }
+            for k in 0..size {
+                let (gate, input) = (i[k], g[k]);
+                i[k] = of_cell[k] * input * gate * (1.0 - gate);
+                g[k] = of_cell[k] * gate * (1.0 - input * input);
+            }
+            for k in 0..size {
+                let gate = f[k];
+                f[k] = of_cell[k] * previous[k] * gate * (1.0 - gate);
+                of_cell[k] *= gate;
+            }
         }
     }
 }

@@ -1,23 +1,30 @@
 //! Layers: what is learned, and how it is applied to tensors.
 //!
-//! A layer is a small value that knows its sizes and which parameters of a [`ParameterSet`](crate::ParameterSet) are its
-//! own. It is applied to tensors with the [`Weights`](crate::Weights) of one graph, so the same model serves any number
-//! of threads, in training and in validation.
+//! A layer is a small value that knows its sizes and which parameters of a
+//! [`ParameterSet`](crate::ParameterSet) are its own. It is applied to tensors with the
+//! [`Weights`](crate::Weights) of one graph, so the same model serves any number of threads, in training and
+//! in validation.
 //!
-//! A sequence is one tensor with a row for each step and member of the batch, step after step: row `t * batch + b`. Taking
-//! such a tensor apart step by step inside the graph would cost a time that grows with the square of its length, because
-//! the gradient of each slice is a tensor of full size. So recurrent layers take whole sequences, and recursions in which
-//! an output feeds back take single steps.
+//! A sequence is one tensor with a row for each step and member of the batch, step after step: row
+//! `t * batch + b`. Taking such a tensor apart step by step inside the graph would cost a time that grows with the
+//! square of its length, because the gradient of each slice is a tensor of full size. So recurrent layers
+//! take whole sequences, and recursions in which an output feeds back take single steps.
 
+mod attention;
+mod bidirectional;
 mod dropout;
 mod gru;
+mod layer_norm;
 mod linear;
 mod lstm;
 #[cfg(test)]
 mod tests;
 
+pub use attention::{Attention, Mask};
+pub use bidirectional::Bidirectional;
 pub use dropout::dropout;
 pub use gru::Gru;
+pub use layer_norm::LayerNorm;
 pub use linear::{Activation, Linear};
 pub use lstm::{Lstm, LstmState};
 

@@ -264,3 +264,77 @@ fn dropout_keeps_the_mean_and_can_be_repeated() {
     assert_eq!(once(1), once(1));
     assert_ne!(once(1), once(2));
 }
+
+#[test]
+fn a_layer_norm_equals_its_definition_and_so_do_its_gradients() {
+    let (rows, size) = (5, 7);
+    let mut set = ParameterSet::new(3);
+    let layer = LayerNorm::new(&mut set, "norm", size).unwrap();
+    for (_, values) in set.values_mut() {
+        values.iter_mut().enumerate().for_each(|(i, value)| *value += 0.3 * (i as f32).sin());
+    }
+    set.add("x", &[rows, size], crate::Initial::Values(numbers(rows * size, 1))).unwrap();
+    let fused = |weights: &Weights| layer.forward(weights, named(&set, weights, "x"));
+    let plain = |weights: &Weights| {
+        let x = named(&set, weights, "x");
+        let centred = x.clone() - x.mean_dim(1);
+        let variance = (centred.clone() * centred.clone()).mean_dim(1);
+        let normal = centred / (variance + 1e-5).sqrt();
+        normal * named(&set, weights, "norm.weight") + named(&set, weights, "norm.bias")
+    };
+    same_gradients(&set, &fused, &plain);
+}
+
+#[test]
+fn attention_equals_its_definition_and_so_do_its_gradients() {
+    use burn::tensor::activation::softmax;
+    let (steps, size, heads) = (4, 6, 2);
+    let mut set = ParameterSet::new(4);
+    let layer = Attention::new(&mut set, "attention", size, heads).unwrap();
+    for (name, salt) in [("x", 1), ("m", 2)] {
+        set.add(name, &[2 * steps, size], crate::Initial::Values(numbers(2 * steps * size, salt))).unwrap();
+    }
+    let seen = vec![1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0];
+    let mask = std::sync::Arc::new(Mask { steps, seen: seen.clone() });
+    let fused = |weights: &Weights| {
+        layer.forward(weights, named(&set, weights, "x"), named(&set, weights, "m"), &mask)
+    };
+    let plain = |weights: &Weights| {
+        let part = |x: Tensor, name: &str| {
+            let weight = named(&set, weights, &format!("attention.{name}.weight"));
+            x.matmul(weight) + named(&set, weights, &format!("attention.{name}.bias"))
+        };
+        let memory = named(&set, weights, "m");
+        let (q, k) = (part(named(&set, weights, "x"), "query"), part(memory.clone(), "key"));
+        let v = part(memory, "value");
+        let mut windows = Vec::new();
+        for window in 0..2 {
+            let closed = seen[window * steps..][..steps].iter().map(|seen| (seen - 1.0) * 1e9).collect();
+            let closed = constant(closed, [1, steps]);
+            let mut all = Vec::new();
+            for head in 0..heads {
+                let cut = |x: &Tensor| {
+                    let width = size / heads;
+                    x.clone().narrow(0, window * steps, steps).narrow(1, head * width, width)
+                };
+                let scores = cut(&q).matmul(cut(&k).transpose()) * (1.0 / 3.0_f32.sqrt());
+                all.push(softmax(scores + closed.clone(), 1).matmul(cut(&v)));
+            }
+            windows.push(Tensor::cat(all, 1));
+        }
+        part(Tensor::cat(windows, 0), "output")
+    };
+    let (one, other) = (Weights::trainable(&set), Weights::trainable(&set));
+    let (fused, plain) = (fused(&one), plain(&other));
+    close(&values(&fused), &values(&plain), "value");
+    let (found, expected) = (one.gradients(&weighted(fused)), other.gradients(&weighted(plain)));
+    for ((entry, found), expected) in set.iter().zip(&found).zip(&expected) {
+        // Keys that all move together change no share, so their bias has no gradient but rounding.
+        if entry.name() == "attention.key.bias" {
+            assert!(found.iter().chain(expected).all(|gradient| gradient.abs() < 1e-5));
+        } else {
+            close(found, expected, entry.name());
+        }
+    }
+    assert!(Attention::new(&mut ParameterSet::new(1), "a", 6, 4).is_err());
+}

@@ -6,10 +6,11 @@ use nalgebra::Vector2;
 use rand::RngExt;
 use serde::Deserialize;
 use tercel_core::sensor::{ConvertedPolar, Measurement, Sensor};
-use tercel_sim::air_traffic::{AirTraffic, NAMES};
+use tercel_sim::air_traffic::{AirTraffic, Flight, NAMES, Radar};
 
 use crate::TrainError;
 use crate::check::{refused, size};
+use crate::task::neural_imm::Population;
 use crate::trainer::{Draw, Split};
 
 /// The section `[data]`.
@@ -30,6 +31,8 @@ pub struct FlightsConfig {
     pub detection: [f64; 2],
     /// How polar measurements become positions.
     pub conversion: Conversion,
+    /// Flights that are drawn in turns in the place of both scenarios, if there are any.
+    pub population: Vec<Population>,
 }
 
 impl Default for FlightsConfig {
@@ -42,6 +45,7 @@ impl Default for FlightsConfig {
             fresh: Fresh::Flights,
             detection: [1.0, 1.0],
             conversion: Conversion::Debiased,
+            population: Vec::new(),
         }
     }
 }
@@ -73,8 +77,20 @@ pub enum Conversion {
 pub struct Flights {
     training: AirTraffic,
     validation: AirTraffic,
+    populations: Vec<AirTraffic>,
     config: FlightsConfig,
     seed: u64,
+}
+
+/// A flight, and what a radar saw of it.
+#[derive(Debug)]
+pub struct Observed {
+    /// The flight.
+    pub flight: Flight,
+    /// The radar.
+    pub radar: Radar,
+    /// Range and bearing at each step, unless it was missed; the first step is always seen.
+    pub plots: Vec<Option<Vector2<f64>>>,
 }
 
 /// Keeps the flights of trainings apart from those of studies, whose seeds are small numbers.
@@ -108,8 +124,14 @@ impl Flights {
             let value = format!("[{low}, {high}]");
             return Err(refused("data.detection", value, "it must be a range above 0 and up to 1"));
         }
+        let training = scenario("data.scenario", &config.scenario)?;
+        let population = |population: &Population| {
+            let fault = |error| TrainError::Recipe(format!("[[data.population]]: {error}"));
+            population.scenario(training.steps()).map_err(fault)
+        };
         Ok(Self {
-            training: scenario("data.scenario", &config.scenario)?,
+            populations: config.population.iter().map(population).collect::<Result<_, _>>()?,
+            training,
             validation: scenario("data.validation_scenario", &config.validation_scenario)?,
             config: config.clone(),
             seed,
@@ -134,6 +156,16 @@ impl Flights {
         }
     }
 
+    /// How polar measurements become positions.
+    pub fn conversion(&self) -> Conversion {
+        self.config.conversion
+    }
+
+    /// Whether a split has the same flights and measurements in every epoch.
+    pub fn repeats(&self, split: Split) -> bool {
+        split == Split::Validation || self.config.fresh == Fresh::Nothing
+    }
+
     /// The flights of a draw.
     ///
     /// # Errors
@@ -147,13 +179,12 @@ impl Flights {
         Ok(rollout)
     }
 
-    fn fly(
-        &self,
-        draw: Draw<'_>,
-        sample: u64,
-        member: usize,
-        rollout: &mut Rollout,
-    ) -> Result<(), TrainError> {
+    /// A flight of a draw, as its radar saw it.
+    ///
+    /// # Errors
+    ///
+    /// If the simulator refuses what the recipe asks for.
+    pub fn observed(&self, draw: Draw<'_>, sample: u64) -> Result<Observed, TrainError> {
         let fault = |error: &dyn std::fmt::Display| TrainError::Data(format!("flight {sample}: {error}"));
         let epoch = draw.epoch as u64;
         let (scenario, seed, run, realisation) = match (draw.split, self.config.fresh) {
@@ -165,16 +196,32 @@ impl Flights {
             }
         };
         let seed = seed ^ self.seed;
+        let scenario = match self.populations.len() as u64 {
+            0 => scenario,
+            count => &self.populations[(sample % count) as usize],
+        };
         let flight = scenario.flight(seed, run);
         let [low, high] = self.config.detection;
         let detection = low + (high - low) * draw.random(sample).random::<f64>();
         let radar = flight.radar().with_detection(detection).map_err(|error| fault(&error))?;
+        let plots = flight.observe(&radar.with_realisation(realisation), seed, run);
+        Ok(Observed { flight, radar, plots })
+    }
+
+    fn fly(
+        &self,
+        draw: Draw<'_>,
+        sample: u64,
+        member: usize,
+        rollout: &mut Rollout,
+    ) -> Result<(), TrainError> {
+        let fault = |error: &dyn std::fmt::Display| TrainError::Data(format!("flight {sample}: {error}"));
+        let Observed { flight, radar, plots } = self.observed(draw, sample)?;
         let converter = ConvertedPolar::new(radar.range(), radar.bearing()).map_err(|error| fault(&error))?;
         let converter = match self.config.conversion {
             Conversion::Debiased => converter,
             Conversion::Plain => converter.biased(),
         };
-        let plots = flight.observe(&radar.with_realisation(realisation), seed, run);
         let read = |plot: &Vector2<f64>| {
             Sensor::<4, 2>::read(&converter, &Measurement::from([plot.x, plot.y])).value
         };
@@ -186,8 +233,8 @@ impl Flights {
     }
 }
 
-/// Flights side by side: what a batch of filters is given, and what it should say. Positions are relative to the first
-/// reading of each flight.
+/// Flights side by side: what a batch of filters is given, and what it should say. Positions are relative to
+/// the first reading of each flight.
 #[derive(Debug)]
 pub struct Rollout {
     /// The number of flights.

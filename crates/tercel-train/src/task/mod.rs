@@ -1,8 +1,14 @@
 //! The tasks: one module for each kind of model.
 
+pub mod deep_mtt;
+pub mod ens_knets;
 pub mod flights;
 pub mod kalman_net;
+pub mod mnemonic;
 pub mod neural_imm;
+pub mod plots;
+pub mod residual;
+pub mod tr_mtt;
 
 use std::ops::ControlFlow;
 
@@ -12,8 +18,14 @@ use crate::recipe;
 use crate::trainer::{Progress, Run, Summary};
 
 /// The kinds of recipes.
-pub const KINDS: [&str; 2] =
-    [<kalman_net::KalmanNetKind as recipe::Kind>::NAME, <neural_imm::NeuralImmKind as recipe::Kind>::NAME];
+pub const KINDS: [&str; 6] = [
+    <deep_mtt::DeepMttKind as recipe::Kind>::NAME,
+    <ens_knets::EnsKNetsKind as recipe::Kind>::NAME,
+    <kalman_net::KalmanNetKind as recipe::Kind>::NAME,
+    <mnemonic::MnemonicKind as recipe::Kind>::NAME,
+    <neural_imm::NeuralImmKind as recipe::Kind>::NAME,
+    <tr_mtt::TrMttKind as recipe::Kind>::NAME,
+];
 
 /// Trains what a recipe describes; its kind chooses the task.
 ///
@@ -26,8 +38,12 @@ pub fn train(
     observer: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Summary, TrainError> {
     match recipe::kind(recipe)?.as_str() {
+        "deep-mtt" => deep_mtt::train(recipe, run, observer),
+        "ens-knets" => ens_knets::train(recipe, run, observer),
         "kalman-net" => kalman_net::train(recipe, run, observer),
+        "mnemonic" => mnemonic::train(recipe, run, observer),
         "neural-imm" => neural_imm::train(recipe, run, observer),
+        "tr-mtt" => tr_mtt::train(recipe, run, observer),
         other => {
             Err(refused("kind", format!("{other:?}"), format!("there are the kinds {}", KINDS.join(", "))))
         }

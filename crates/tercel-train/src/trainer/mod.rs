@@ -120,17 +120,18 @@ pub enum End {
 
 /// Trains a task as a recipe says.
 ///
-/// After each epoch the model is validated. The model file is written when it is the best so far, then the checkpoint and
-/// the curve; each appears whole or not at all, so a training that is killed, or whose disk is full, leaves the last good
-/// model, and goes on from the last whole epoch with `resume`. All that is random follows from the seed, the epoch and
-/// the number of the sample, so a training that was interrupted gives the same weights, bit for bit, as one that was not.
+/// After each epoch the model is validated. The model file is written when it is the best so far, then the
+/// checkpoint and the curve; each appears whole or not at all, so a training that is killed, or whose disk is
+/// full, leaves the last good model, and goes on from the last whole epoch with `resume`. All that is random
+/// follows from the seed, the epoch and the number of the sample, so a training that was interrupted gives
+/// the same weights, bit for bit, as one that was not.
 ///
 /// The observer is called after each batch and epoch, and may end the training.
 ///
 /// # Errors
 ///
-/// If the model file cannot be written (found out before the first step), the checkpoint is missing, damaged or of
-/// another recipe, the task fails, or no batch of an epoch had a finite loss and gradient.
+/// If the model file cannot be written (found out before the first step), the checkpoint is missing, damaged
+/// or of another recipe, the task fails, or no batch of an epoch had a finite loss and gradient.
 pub fn train<K: Kind, T: Task>(
     recipe: &Recipe<K>,
     task: &T,
@@ -258,8 +259,8 @@ impl<T: Task> Trainer<'_, T> {
         Ok(ControlFlow::Continue((whole, rate)))
     }
 
-    /// Changes the parameters by the mean gradient of a tally, or skips and counts it if it is not finite. Gives the
-    /// learning rate.
+    /// Changes the parameters by the mean gradient of a tally, or skips and counts it if it is not finite.
+    /// Gives the learning rate.
     fn update(&mut self, tally: &mut Tally, updates_per_epoch: usize) -> f64 {
         let cosine = Cosine {
             top: self.state.optimiser.top_rate(),
@@ -302,7 +303,9 @@ impl<T: Task> Trainer<'_, T> {
         let parts = row.validation_parts.iter().map(|(name, value)| (format!("validation_{name}"), *value));
         let losses = [("training_loss".to_owned(), row.loss), ("validation_loss".to_owned(), row.validation)];
         card.metrics.extend(losses.into_iter().chain(parts).filter_map(|(name, value)| Some((name, value?))));
-        Ok(Model::new(card, self.state.parameters.tensors())?)
+        let mut tensors = self.state.parameters.tensors();
+        tensors.extend(self.task.frozen());
+        Ok(Model::new(card, tensors)?)
     }
 
     /// The model if it is the best, then the checkpoint, then the curve.

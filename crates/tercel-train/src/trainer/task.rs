@@ -1,5 +1,6 @@
 //! What is trained, as the trainer sees it.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use rand_chacha::ChaCha8Rng;
@@ -41,7 +42,8 @@ pub struct Draw<'a> {
 }
 
 impl Draw<'_> {
-    /// Random numbers for one sample, for what is drawn anew in each epoch: noise, missed measurements, dropout.
+    /// Random numbers for one sample, for what is drawn anew in each epoch: noise, missed measurements,
+    /// dropout.
     pub fn random(&self, sample: u64) -> ChaCha8Rng {
         let split = match self.split {
             Split::Training => 0x7261_696e,
@@ -66,16 +68,23 @@ pub struct Loss {
 
 /// A task: a model, its data and its loss.
 ///
-/// A task is a plain value that any number of threads read at a time. The crate's documentation has an example.
+/// A task is a plain value that any number of threads read at a time. The crate's documentation has an
+/// example.
 pub trait Task: Sync {
     /// The data of one shard of a batch.
     type Batch: Send;
-    /// What is carried from one window of truncated back-propagation to the next: detached states. `()` without windows.
+    /// What is carried from one window of truncated back-propagation to the next: detached states. `()`
+    /// without windows.
     type Memory: Send;
 
-    /// The card of the model as far as the task knows it: kind, state, sizes and options, scales. The trainer fills in the
-    /// rest.
+    /// The card of the model as far as the task knows it: kind, state, sizes and options, scales. The trainer
+    /// fills in the rest.
     fn card(&self) -> Card;
+
+    /// Tensors of the model that are not trained: those of networks that this one builds on.
+    fn frozen(&self) -> BTreeMap<String, tercel_neural::Tensor> {
+        BTreeMap::new()
+    }
 
     /// The number of samples of a split.
     fn samples(&self, split: Split) -> usize;
@@ -94,8 +103,8 @@ pub trait Task: Sync {
 
     /// The loss of a window.
     ///
-    /// The memory is `None` in the first window. What is left in it is given to the next one, of the same batch; it must be
-    /// detached, or the gradient would reach into a graph that is gone.
+    /// The memory is `None` in the first window. What is left in it is given to the next one, of the same
+    /// batch; it must be detached, or the gradient would reach into a graph that is gone.
     ///
     /// # Errors
     ///

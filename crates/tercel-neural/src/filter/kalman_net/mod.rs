@@ -22,10 +22,10 @@ pub use hyper::{Architecture, Covariance, Feature, KalmanNetHyper};
 pub use network::GainNetwork;
 
 /// The kind of these models in their cards.
-const KIND: &str = "kalman-net";
+pub(super) const KIND: &str = "kalman-net";
 
 /// The state for which they are made.
-const LABELS: [&str; 4] = ["x", "y", "vx", "vy"];
+pub(super) const LABELS: [&str; 4] = ["x", "y", "vx", "vy"];
 
 /// Estimates position and velocity in the plane with the prediction of a motion model and a gain that a recurrent network
 /// gives, from what was observed and estimated last.

@@ -2,16 +2,18 @@
 //!
 //! ## Definition
 //!
-//! The filter of [`tercel_neural::filter::KalmanNet`], differentiable: prediction with a fixed turn rate, features, gain
-//! network, correction. The loss is the mean square of the scaled errors of all posterior states,
+//! The filter of [`tercel_neural::filter::KalmanNet`], differentiable: prediction with a fixed turn rate,
+//! features, gain network, correction. The loss is the mean square of the scaled errors of all posterior
+//! states,
 //!
 //! ```text
 //! L = mean over flights, steps and components of ((x̂(t|t) - x(t)) / s)²,   s = (position, position, velocity, velocity)
 //! ```
 //!
-//! and its gradient flows through the recursion of the filter, within windows of truncated back-propagation if they are
-//! asked for. A filter starts as at run time, with the first reading and no velocity. Positions are relative to the
-//! first reading, for single precision. In the frame of the sensor, the direction of the line of sight counts as given.
+//! and its gradient flows through the recursion of the filter, within windows of truncated back-propagation
+//! if they are asked for. A filter starts as at run time, with the first reading and no velocity. Positions
+//! are relative to the first reading, for single precision. In the frame of the sensor, the direction of the
+//! line of sight counts as given.
 //!
 //! ## Use it when
 //!
@@ -19,9 +21,9 @@
 //!
 //! ## Reference
 //!
-//! G. Revach et al., "KalmanNet: neural network aided Kalman filtering for partially known dynamics", IEEE TSP 70 (2022).
-//! Deviations: the first state is not known; measurements may be missing in training; gain offset, magnitudes and
-//! sensor frame as at run time. Windows as in X. Song et al. (2024).
+//! G. Revach et al., "KalmanNet: neural network aided Kalman filtering for partially known dynamics", IEEE
+//! TSP 70 (2022). Deviations: the first state is not known; measurements may be missing in training; gain
+//! offset, magnitudes and sensor frame as at run time. Windows as in X. Song et al. (2024).
 
 mod filter;
 mod network;
@@ -132,7 +134,8 @@ impl KalmanNetTask {
         Ok((task, set))
     }
 
-    /// The mean of the scaled squares of the errors of some steps, and of the plain squares of positions and velocities.
+    /// The mean of the scaled squares of the errors of some steps, and of the plain squares of positions and
+    /// velocities.
     fn judge(&self, rollout: &Rollout, estimates: Vec<Tensor>, first: usize) -> Loss {
         let (members, skipped) = (rollout.members, self.loss.skip.saturating_sub(first - 1));
         let first = first + skipped;

@@ -1,4 +1,5 @@
-//! The gain network of a KalmanNet, differentiable: the layers of [`tercel_neural::filter::Architecture`] by the same names.
+//! The gain network of a KalmanNet, differentiable: the layers of [`tercel_neural::filter::Architecture`] by
+//! the same names.
 
 use tercel_neural::filter::{Architecture, KalmanNetHyper};
 

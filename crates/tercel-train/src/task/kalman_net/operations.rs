@@ -1,7 +1,7 @@
 //! The operations of a KalmanNet step, each with a backward pass of its own.
 //!
-//! A step of 128 filters is many operations on few numbers, and each costs more for being recorded than for its
-//! arithmetic. So what a step needs beside its network is four operations.
+//! A step of 128 filters is many operations on few numbers, and each costs more for being recorded than for
+//! its arithmetic. So what a step needs beside its network is four operations.
 
 use std::sync::Arc;
 
@@ -42,11 +42,12 @@ impl View {
     }
 }
 
-/// The inputs of the network, of `y`, the last reading, the predicted state, and the last motion and correction:
-/// `[batch, 2]`, `[batch, 2]`, and `[batch, 4]` thrice.
+/// The inputs of the network, of `y`, the last reading, the predicted state, and the last motion and
+/// correction: `[batch, 2]`, `[batch, 2]`, and `[batch, 4]` thrice.
 ///
-/// The definition is that of [`KalmanNetHyper`](tercel_neural::filter::KalmanNetHyper). What depends on the direction or
-/// length of the line of sight is not differentiated: a metre more or less is nothing at a range of kilometres.
+/// The definition is that of [`KalmanNetHyper`](tercel_neural::filter::KalmanNetHyper). What depends on the
+/// direction or length of the line of sight is not differentiated: a metre more or less is nothing at a range
+/// of kilometres.
 #[derive(Debug, Clone)]
 pub(super) struct Features {
     pub(super) features: Vec<Feature>,
@@ -168,7 +169,8 @@ impl Operation<5> for Features {
 }
 
 impl Features {
-    /// The gradient with respect to a difference, given that of its turned form and of its magnitude (with the scale).
+    /// The gradient with respect to a difference, given that of its turned form and of its magnitude (with
+    /// the scale).
     fn slope(
         &self,
         value: &[f32; 4],

@@ -130,7 +130,8 @@ fn the_gradient_through_the_recursion_equals_differences() {
             };
             let slope = (moved(1.0) - moved(-1.0)) / (2.0 * length);
             let name = set.iter().nth(place).unwrap().name();
-            // The direction of the line of sight counts as given in the gradient, but moves in the difference.
+            // The direction of the line of sight counts as given in the gradient, but moves in the
+            // difference.
             assert!((slope - norm).abs() < 0.03 * norm, "{options} {name}: slope {slope} for {norm}");
         }
     }

@@ -89,7 +89,8 @@ impl Default for Population {
 }
 
 impl Population {
-    fn scenario(&self, steps: usize) -> Result<AirTraffic, SimulationError> {
+    /// The scenario, for flights of this many steps.
+    pub(in crate::task) fn scenario(&self, steps: usize) -> Result<AirTraffic, SimulationError> {
         let interval = |[low, high]: [f64; 2]| Interval::new(low, high);
         AirTraffic::training()
             .with_steps(steps)?

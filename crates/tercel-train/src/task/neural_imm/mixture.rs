@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::NeuralImmLoss;
 use super::data::{Followed, Instant};
 use crate::backend::{Forward, Matrix, Operation, Past};
+use crate::task::residual::likelihood;
 
 /// The loss of a batch, of the outputs `[updates * members, rates + 6]`: one row `total, position, velocity, entropy,
 /// likelihood`, each the mean over flights, of which only the first is differentiated.
@@ -49,7 +50,7 @@ impl Mixture {
         }
         let flown = self.share(&probabilities, instant.manoeuvre).max(1e-12);
         let scales = [output[rates + 4], output[rates + 5]];
-        let (likelihood, of_scales) = likelihood(&error, instant, scales);
+        let (likelihood, of_scales) = likelihood(&error, &instant.root, scales);
         Estimate { probabilities, error, entropy: -flown.ln(), likelihood, of_scales }
     }
 
@@ -104,31 +105,6 @@ impl Sums {
         let bank = [self.bank_position, self.bank_velocity].map(|sum| (sum / (2.0 * self.count)).sqrt());
         [(bank[0] * loss.position as f32).sqrt().max(1e-3), (bank[1] * loss.velocity as f32).sqrt().max(1e-3)]
     }
-}
-
-/// Half the squared Mahalanobis distance plus the logarithm of the determinant, for scaled deviations, and its derivatives with
-/// respect to the logarithms of the scales. The error counts as given.
-fn likelihood(error: &[f32; 4], instant: &Instant, scales: [f32; 2]) -> (f32, [f32; 2]) {
-    let shrink = [(-scales[0]).exp(), (-scales[0]).exp(), (-scales[1]).exp(), (-scales[1]).exp()];
-    let y: [f32; 4] = std::array::from_fn(|i| shrink[i] * error[i]);
-    let root = &instant.root;
-    let mut w = y;
-    for i in 0..4 {
-        for j in 0..i {
-            w[i] -= root[i][j] * w[j];
-        }
-        w[i] /= root[i][i];
-    }
-    let mut g = w;
-    for i in (0..4).rev() {
-        for j in i + 1..4 {
-            g[i] -= root[j][i] * g[j];
-        }
-        g[i] /= root[i][i];
-    }
-    let square: f32 = w.iter().map(|w| w * w).sum();
-    let of = |i: usize| 2.0 - y[i] * g[i] - y[i + 1] * g[i + 1];
-    (0.5 * square + 2.0 * (scales[0] + scales[1]), [of(0), of(2)])
 }
 
 fn softmax(values: &mut [f32]) {
