@@ -43,10 +43,19 @@ fn run(folder: &Path, arguments: &[&str]) -> Run {
 #[test]
 fn models_are_listed_from_their_folder() {
     let folder = folder(false);
-    let listed = run(folder.path(), &["list"]).succeeded();
+    let listed = run(folder.path(), &["list", "models"]).succeeded();
     insta::assert_snapshot!("models_list", listed.transcript());
     let json = run(folder.path(), &["list", "models/beta.safetensors", "--json"]).succeeded().json();
     assert_eq!((&json["card"]["name"], &json["file"]), (&"beta".into(), &"models/beta.safetensors".into()));
+}
+
+#[test]
+fn without_a_path_the_models_that_come_with_the_program_are_meant() {
+    let folder = tempfile::tempdir().unwrap();
+    let verified = run(folder.path(), &["verify"]).succeeded();
+    assert!(verified.stdout.contains("neural-imm: ok (neural-imm neural-imm, "), "{}", verified.stdout);
+    let shown = run(folder.path(), &["list", "--json"]).succeeded();
+    assert!(shown.stdout.lines().any(|line| line.contains(r#""shipped":"neural-imm""#)), "{}", shown.stdout);
 }
 
 #[test]
@@ -59,16 +68,19 @@ fn a_card_is_shown_as_toml_that_can_be_read() {
 
 #[test]
 fn good_models_are_verified() {
-    insta::assert_snapshot!("models_verify", run(folder(false).path(), &["verify"]).succeeded().transcript());
+    insta::assert_snapshot!(
+        "models_verify",
+        run(folder(false).path(), &["verify", "models"]).succeeded().transcript()
+    );
 }
 
 #[test]
 fn a_broken_model_is_named_and_the_others_are_still_read() {
     let folder = folder(true);
-    let verified = run(folder.path(), &["verify"]);
+    let verified = run(folder.path(), &["verify", "models"]);
     assert_eq!(verified.code, 3);
     insta::assert_snapshot!("models_broken", verified.transcript());
-    assert_eq!(run(folder.path(), &["list"]).code, 3);
+    assert_eq!(run(folder.path(), &["list", "models"]).code, 3);
 }
 
 #[test]
@@ -93,7 +105,7 @@ fn a_card_beside_a_model_that_says_something_else_is_refused() {
     let folder = folder(false);
     let other = model("other").card().to_toml().unwrap();
     std::fs::write(folder.path().join("models/alpha.toml"), other).unwrap();
-    let verified = run(folder.path(), &["verify"]);
+    let verified = run(folder.path(), &["verify", "models"]);
     assert_eq!(verified.code, 3);
     assert!(verified.stderr.contains("models/alpha.toml: differs from the card in models/alpha.safetensors"));
 }
@@ -101,7 +113,7 @@ fn a_card_beside_a_model_that_says_something_else_is_refused() {
 #[test]
 fn a_folder_without_models_is_bad_input() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(run(folder.path(), &["list"]).stderr.contains("models: cannot read"));
+    assert!(run(folder.path(), &["list", "models"]).stderr.contains("models: cannot read"));
     let empty = run(folder.path(), &["verify", "."]);
     assert_eq!(empty.code, 3);
     assert!(empty.stderr.contains("there is no model in this folder"), "{}", empty.stderr);

@@ -25,6 +25,14 @@ pub enum ModelError {
         /// The largest size.
         limit: u64,
     },
+    /// No model of this name comes with Tercel.
+    #[error("no model `{name}` comes with Tercel; there are: {known}")]
+    NotShipped {
+        /// The name that was given.
+        name: String,
+        /// The names that exist.
+        known: String,
+    },
     /// The file is no safetensors file, or it is damaged or cut short.
     #[error("{file}: not a whole safetensors file: {reason}")]
     Damaged {

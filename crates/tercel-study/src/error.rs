@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use tercel_core::error::FilterError;
 use tercel_data::DataError;
+use tercel_neural::ModelError;
 use tercel_pipeline::PipelineError;
 
 use crate::report::ReportError;
@@ -115,6 +116,9 @@ pub enum StudyError {
     /// A configuration or a scan was refused.
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
+    /// A model could not be used.
+    #[error(transparent)]
+    Model(#[from] ModelError),
     /// A score could not be computed.
     #[error(transparent)]
     Score(#[from] FilterError),

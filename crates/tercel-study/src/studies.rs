@@ -83,7 +83,7 @@ fn boxed<E: Experiment + 'static>(
 }
 
 /// All studies.
-pub const STUDIES: [Study; 5] = [
+pub const STUDIES: [Study; 6] = [
     Study {
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
@@ -126,6 +126,17 @@ pub const STUDIES: [Study; 5] = [
             runs: 200,
             sets: &["test", "hshm"],
             build: |r| boxed(AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods)),
+        }),
+    },
+    Study {
+        name: "atc-ablation",
+        about: "what the parts of the published ensemble are worth, on validation flights (Table 2)",
+        methods: &air_traffic::methods::ABLATION,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: air_traffic::SEED,
+            runs: 1000,
+            sets: &[],
+            build: |r| boxed(AirTrafficExperiment::ablation(r.seed, r.runs, r.methods)),
         }),
     },
     Study {
@@ -276,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_plan_gives_its_experiment_back() {
-        for name in ["atc-test", "atc-hshm", "atc-noise", "atc-missing"] {
+        for name in ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "atc-ablation"] {
             let choice = Choice { runs: Some(3), seed: Some(u64::MAX), ..Choice::default() };
             let plan = Study::find(name).unwrap().experiment(&choice).unwrap().plan().clone();
             assert_eq!(experiment_of(&plan).unwrap().plan(), &plan);

@@ -3,7 +3,7 @@
 //! ```toml
 //! version = 1
 //! kind = "kalman-net"      # chooses the task, and with it the keys of [data], [model] and [loss]
-//! name = "kalman-net-2"
+//! name = "kalman-net-straight"
 //! seed = 1
 //!
 //! [data]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
-use tercel_neural::{Card, Model, filter};
+use tercel_neural::{Card, Model, filter, shipped};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -31,8 +31,8 @@ pub enum ModelsCommand {
 /// Which models.
 #[derive(Debug, Args)]
 pub struct ModelArguments {
-    /// Models, or folders that hold them.
-    #[arg(value_name = "PATH", default_value = "models")]
+    /// Models, or folders that hold them; without any, the models that come with Tercel.
+    #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
 }
 
@@ -49,8 +49,8 @@ pub struct JsonArguments {
 const AFTER: &str = "\
 Examples:
   tercel models list
-  tercel models show models/kalman-net-2.safetensors
-  tercel models verify";
+  tercel models show my-models/turns.safetensors
+  tercel models verify my-models";
 
 const LIST_AFTER: &str = "\
 Examples:
@@ -59,7 +59,7 @@ Examples:
 
 const SHOW_AFTER: &str = "\
 Examples:
-  tercel models show models/kalman-net-2.safetensors";
+  tercel models show my-models/turns.safetensors";
 
 const VERIFY_AFTER: &str = "\
 The exit code is 0 when all models are good, and 3 when one is not.
@@ -79,13 +79,48 @@ impl ModelsCommand {
     }
 }
 
+/// A model that is meant: its file, or its name if it comes with Tercel.
+enum Place {
+    File(PathBuf),
+    Shipped(&'static str),
+}
+
+impl Place {
+    fn name(&self) -> String {
+        match self {
+            Place::File(path) => path.display().to_string(),
+            Place::Shipped(name) => (*name).to_owned(),
+        }
+    }
+
+    fn read(&self) -> Result<Model, Failure> {
+        Ok(match self {
+            Place::File(path) => Model::open(path)?,
+            Place::Shipped(name) => shipped::model(name)?,
+        })
+    }
+
+    /// The model, of which a filter can be made and whose card for people says the same.
+    fn verified(&self) -> Result<Model, Failure> {
+        let model = self.read()?;
+        filter::check(&model)?;
+        if let Place::File(path) = self {
+            same_twin(path, &model)?;
+        }
+        Ok(model)
+    }
+}
+
 impl ModelArguments {
-    /// The files that are meant: those that are named, and those in folders that are named, by name.
-    fn files(&self) -> Result<Vec<PathBuf>, Failure> {
-        let mut files = Vec::new();
+    /// What is meant: the files that are named, and those in folders that are named, by name.
+    fn places(&self) -> Result<Vec<Place>, Failure> {
+        if self.paths.is_empty() {
+            return Ok(shipped::NAMES.map(Place::Shipped).into());
+        }
+        let mut places = Vec::new();
         for path in &self.paths {
             if !path.is_dir() {
-                files.push(path.clone());
+                places.push(Place::File(path.clone()));
                 continue;
             }
             let found = in_folder(path)
@@ -94,17 +129,17 @@ impl ModelArguments {
                 let message = format!("{}: there is no model in this folder", path.display());
                 return Err(Failure::input(message).with_help("a model is a file that ends in .safetensors"));
             }
-            files.extend(found);
+            places.extend(found.into_iter().map(Place::File));
         }
-        Ok(files)
+        Ok(places)
     }
 
     fn verify(&self, console: &Console) -> Result<(), Failure> {
-        let files = self.files()?;
+        let places = self.places()?;
         let mut bad = 0;
-        for file in &files {
-            match verified(file) {
-                Ok(model) => print(&format!("{}: ok ({})\n", file.display(), described(&model)))?,
+        for place in &places {
+            match place.verified() {
+                Ok(model) => print(&format!("{}: ok ({})\n", place.name(), described(&model)))?,
                 Err(failure) => {
                     console.fail(&failure);
                     bad += 1;
@@ -113,44 +148,43 @@ impl ModelArguments {
         }
         match bad {
             0 => Ok(()),
-            _ => Err(Failure::input(format!("{bad} of {} models cannot be used", files.len()))),
+            _ => Err(Failure::input(format!("{bad} of {} models cannot be used", places.len()))),
         }
     }
 }
 
 impl JsonArguments {
     fn list(&self) -> Result<(), Failure> {
-        let files = self.models.files()?;
-        let width = files.iter().map(|file| file.display().to_string().len()).max().unwrap_or(0);
-        for file in &files {
-            let model = Model::open(file)?;
+        let places = self.models.places()?;
+        let width = places.iter().map(|place| place.name().len()).max().unwrap_or(0);
+        for place in &places {
+            let model = place.read()?;
             if self.json {
-                print_json(&as_json(file, &model))?;
+                print_json(&as_json(place, &model))?;
             } else {
                 let loss = model.card().metrics.get("validation_loss");
                 let loss = loss.map(|loss| format!(", validation loss {loss:.6}")).unwrap_or_default();
-                let name = file.display().to_string();
-                print(&format!("{name:width$}  {}{loss}\n", described(&model)))?;
+                print(&format!("{:width$}  {}{loss}\n", place.name(), described(&model)))?;
             }
         }
         Ok(())
     }
 
     fn show(&self) -> Result<(), Failure> {
-        for file in self.models.files()? {
-            let model = Model::open(&file)?;
+        for place in self.models.places()? {
+            let model = place.read()?;
             if self.json {
-                print_json(&as_json(&file, &model))?;
+                print_json(&as_json(&place, &model))?;
                 continue;
             }
             let card = model
                 .card()
                 .to_toml()
-                .map_err(|error| Failure::input(format!("{}: model card: {error}", file.display())))?;
+                .map_err(|error| Failure::input(format!("{}: model card: {error}", place.name())))?;
             let tensors = model.tensors().iter();
             let tensors: String =
                 tensors.map(|(name, tensor)| format!("#   {name} {:?}\n", tensor.shape)).collect();
-            let title = format!("# {}: {} parameters\n", file.display(), parameters(&model));
+            let title = format!("# {}: {} parameters\n", place.name(), parameters(&model));
             print(&format!("{title}{card}# tensors:\n{tensors}"))?;
         }
         Ok(())
@@ -169,10 +203,8 @@ fn in_folder(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// A model that a filter can be made of, whose card for people says the same.
-fn verified(file: &Path) -> Result<Model, Failure> {
-    let model = Model::open(file)?;
-    filter::check(&model)?;
+/// Refuses a card beside a model that says something else.
+fn same_twin(file: &Path, model: &Model) -> Result<(), Failure> {
     let twin = file.with_extension("toml");
     if let Ok(text) = std::fs::read_to_string(&twin) {
         let card = Card::from_toml(&text)
@@ -182,7 +214,7 @@ fn verified(file: &Path) -> Result<Model, Failure> {
             return Err(Failure::input(message).with_help("the card in the model counts"));
         }
     }
-    Ok(model)
+    Ok(())
 }
 
 fn parameters(model: &Model) -> usize {
@@ -198,6 +230,10 @@ fn described(model: &Model) -> String {
     format!("{} {}, {} parameters{trained}", card.kind, card.name, parameters(model))
 }
 
-fn as_json(file: &Path, model: &Model) -> Value {
-    json!({ "file": file, "parameters": parameters(model), "card": model.card() })
+fn as_json(place: &Place, model: &Model) -> Value {
+    let (parameters, card) = (parameters(model), model.card());
+    match place {
+        Place::File(file) => json!({ "file": file, "parameters": parameters, "card": card }),
+        Place::Shipped(name) => json!({ "shipped": name, "parameters": parameters, "card": card }),
+    }
 }

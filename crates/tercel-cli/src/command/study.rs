@@ -2,6 +2,7 @@
 
 mod merge;
 
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -13,6 +14,11 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
+
+/// A name without the spaces around it, as in `--methods "ekf, imm"`.
+fn trimmed(name: &str) -> Result<String, Infallible> {
+    Ok(name.trim().to_owned())
+}
 
 /// Run a study: a scenario, several methods, their scores.
 ///
@@ -31,7 +37,7 @@ pub struct StudyArguments {
     #[arg(value_name = "NAME", required = true)]
     name: Option<String>,
     /// Methods to run, with commas between them; without it, all of the study.
-    #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
+    #[arg(long, value_name = "A,B,...", value_delimiter = ',', value_parser = trimmed)]
     methods: Option<Vec<String>>,
     /// Number of runs.
     #[arg(long, value_name = "N")]

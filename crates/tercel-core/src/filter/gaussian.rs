@@ -72,10 +72,15 @@ pub(super) fn moments<const N: usize, G: Borrow<Gaussian<N>>>(
         }
         total += weight;
     }
-    // Means that lie far apart can hide everything else from a double. What is not finite stays so, for the next update
-    // to report.
+    settle(&mut merged);
+    merged
+}
+
+/// Makes the covariance of a mixture definite again, when its means lie so far apart that they hide everything else from a
+/// double. What is not finite stays so, for the next update to report.
+#[inline]
+pub(super) fn settle<const N: usize>(merged: &mut Gaussian<N>) {
     if !positive::is_definite(&merged.covariance) {
         let _ = positive::settle(&mut merged.covariance, "covariance of a mixture");
     }
-    merged
 }

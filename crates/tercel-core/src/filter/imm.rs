@@ -1,13 +1,16 @@
 //! The interacting multiple model filter.
 
+mod mixing;
+
 use nalgebra::{SMatrix, Vector2};
 
-use super::gaussian::moments;
+use super::gaussian::{moments, settle};
 use super::innovation::Blend;
 use super::transition::Chain;
 use super::{Estimate, Filter, Innovation, Transition};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
+use mixing::Origin;
 
 /// Estimates a state whose motion changes between models, with one filter per model and their probabilities.
 ///
@@ -33,7 +36,9 @@ use crate::error::FilterError;
 /// manoeuvring. A rate between the models is followed by mixing them; one outside makes the filter lag.
 ///
 /// ## Reference
-/// Blom and Bar-Shalom (1988), eqs. 3 to 9. Deviations: likelihoods in the log domain; the transition may scale with `dt`.
+/// Blom and Bar-Shalom (1988), eqs. 3 to 9. Deviations: likelihoods in the log domain; the transition may scale with `dt`; where all
+/// changes are equally probable, the modes mix with their common moments, which gives the same in a time that grows with their
+/// number and not with its square.
 ///
 /// Validated against FilterPy 1.4.5 over 30 steps of two modes: probabilities, states and covariances agree to 1e-9.
 ///
@@ -62,17 +67,18 @@ pub struct Imm<F> {
 /// What an [`Imm`] filter knows of one object: a belief and a probability for each mode.
 #[derive(Debug, PartialEq)]
 pub struct ImmBelief<B, const N: usize> {
-    modes: Vec<Mode<B, N>>,
+    modes: Vec<Mode<B>>,
     probabilities: Vec<f64>,
-    /// Room for the transition over a step that had to be computed.
+    /// Room for the transition over a step that has to be computed.
     transition: Vec<f64>,
+    /// Room for where the modes start from.
+    origins: Vec<Origin<N>>,
 }
 
 /// The belief of one mode, with room for a step: beliefs change in place and no step allocates.
 #[derive(Debug, Clone, PartialEq)]
-struct Mode<B, const N: usize> {
+struct Mode<B> {
     belief: B,
-    state: Gaussian<N>,
     weight: f64,
 }
 
@@ -137,6 +143,7 @@ impl<B: Clone, const N: usize> Clone for ImmBelief<B, N> {
             modes: self.modes.clone(),
             probabilities: self.probabilities.clone(),
             transition: Vec::new(),
+            origins: Vec::new(),
         }
     }
 
@@ -158,29 +165,20 @@ impl<F> Imm<F> {
     where
         F: Filter<N>,
     {
-        let ImmBelief { modes, probabilities, transition } = belief;
-        let count = self.filters.len();
-        let transition = self.chain.over(dt, transition);
-        for (mode, filter) in modes.iter_mut().zip(&self.filters) {
-            mode.state = filter.state(&mode.belief);
-        }
-        for (j, filter) in self.filters.iter().enumerate() {
-            let flow = |i: usize| probabilities[i] * transition[i * count + j];
-            let total: f64 = (0..count).map(flow).sum();
-            modes[j].weight = total.max(FLOOR);
+        let ImmBelief { modes, probabilities, transition, origins } = belief;
+        origins.clear();
+        let states = modes.iter().zip(&self.filters).zip(&*probabilities);
+        origins
+            .extend(states.map(|((mode, filter), weight)| Origin::new(*weight, filter.state(&mode.belief))));
+        self.chain.leap(dt, transition, |leap| mixing::mix(origins, &leap));
+        for ((mode, filter), origin) in modes.iter_mut().zip(&self.filters).zip(&*origins) {
             // Without anything from other modes, mixing would only round.
-            if total > flow(j) {
-                let parts = (0..count).filter_map(|i| {
-                    let flow = flow(i);
-                    // In a joint transition with a part that never changes, nearly nothing flows.
-                    (flow > 0.0).then(|| (flow / total, &modes[i].state))
-                });
-                let mixed = moments(parts);
-                filter.set_state(&mut modes[j].belief, &mixed);
+            if origin.mixed {
+                filter.set_state(&mut mode.belief, &origin.state);
             }
         }
-        for (probability, mode) in probabilities.iter_mut().zip(modes) {
-            *probability = mode.weight;
+        for (probability, origin) in probabilities.iter_mut().zip(origins) {
+            *probability = origin.weight.max(FLOOR);
         }
     }
 }
@@ -195,11 +193,15 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
             .iter()
             .map(|filter| {
                 let belief = filter.birth(measurement)?;
-                let state = filter.state(&belief);
-                Ok(Mode { belief, state, weight: 0.0 })
+                Ok(Mode { belief, weight: 0.0 })
             })
             .collect();
-        Ok(ImmBelief { modes: modes?, probabilities: self.initial.clone(), transition: Vec::new() })
+        Ok(ImmBelief {
+            modes: modes?,
+            probabilities: self.initial.clone(),
+            transition: Vec::new(),
+            origins: Vec::new(),
+        })
     }
 
     fn predict(&self, belief: &mut Self::Belief, dt: f64) {

@@ -6,8 +6,8 @@ use nalgebra::DMatrix;
 
 use crate::error::FilterError;
 
-pub(super) use chain::Chain;
 use chain::Link;
+pub(super) use chain::{Chain, Leap};
 
 /// How probable each change of mode is, over a step or over time.
 ///

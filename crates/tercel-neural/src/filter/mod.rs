@@ -45,7 +45,7 @@ use crate::model::Model;
 const LABELS: [&str; 4] = ["x", "y", "vx", "vy"];
 
 /// The kinds of models that there are filters for.
-pub const KINDS: [&str; 5] = ["deep-mtt", "kalman-net", "mnemonic", "neural-imm", "tr-mtt"];
+pub const KINDS: [&str; 6] = ["deep-mtt", "ens-knets", "kalman-net", "mnemonic", "neural-imm", "tr-mtt"];
 
 /// Accepts a model of which a filter can be made.
 ///
@@ -54,6 +54,7 @@ pub const KINDS: [&str; 5] = ["deep-mtt", "kalman-net", "mnemonic", "neural-imm"
 pub fn check(model: &Model) -> Result<(), ModelError> {
     match model.card().kind.as_str() {
         "deep-mtt" => ResidualNetwork::from_model(model).map(drop),
+        "ens-knets" => EnsembleNetwork::from_model(model).map(drop),
         "kalman-net" => GainNetwork::from_model(model).map(drop),
         "mnemonic" => MnemonicNetwork::from_model(model).map(drop),
         "neural-imm" => BankNetwork::from_model(model).map(drop),

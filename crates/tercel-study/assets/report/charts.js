@@ -52,7 +52,7 @@ function createChart(host, chart, clock) {
 
 function chartTraces(chart, colours) {
   return chart.parts.flatMap((part, i) => {
-    const colour = colours.parts[i % colours.parts.length];
+    const colour = colours.parts[part.place % colours.parts.length];
     const stacked = chart.form === "stacked";
     const curve = {
       type: "scatter",
@@ -60,7 +60,7 @@ function chartTraces(chart, colours) {
       name: plotText(part.name),
       x: chart.x,
       y: part.y,
-      line: { color: colour, width: stacked ? 1 : 1.8, shape: chart.form === "steps" ? "hv" : "linear", dash: dashOf(i, colours) },
+      line: { color: colour, width: stacked ? 1 : 1.8, shape: chart.form === "steps" ? "hv" : "linear", dash: dashOf(part.place, colours) },
       marker: { color: colour },
       stackgroup: stacked ? "parts" : undefined,
       hovertemplate: "%{y:.4~g}",
@@ -73,7 +73,7 @@ function chartTraces(chart, colours) {
 
 /** More parts than colours: the later ones are dashed. */
 function dashOf(index, colours) {
-  return ["solid", "dash", "dot"][Math.floor(index / colours.parts.length) % 3];
+  return ["solid", "dash", "dot", "dashdot"][Math.floor(index / colours.parts.length) % 4];
 }
 
 /** The area between two edges. It comes and goes with its curve when the legend is clicked. */

@@ -1,4 +1,4 @@
-//! The studies `atc-test`, `atc-hshm`, `atc-noise` and `atc-missing` as experiments.
+//! The studies `atc-test`, `atc-hshm`, `atc-noise`, `atc-missing` and `atc-ablation` as experiments.
 
 use std::collections::BTreeMap;
 
@@ -43,6 +43,14 @@ impl AirTrafficExperiment {
         methods: &[String],
     ) -> Result<Self, StudyError> {
         Self::new(set, (set, None, vec![None]), seed, runs, methods)
+    }
+
+    /// Flights of the population `atc-validation`, each seen by its own radar.
+    ///
+    /// # Errors
+    /// When a method is not known.
+    pub fn ablation(seed: u64, runs: u64, methods: &[String]) -> Result<Self, StudyError> {
+        Self::new("atc-validation", ("atc-ablation", None, vec![None]), seed, runs, methods)
     }
 
     /// The same flights, seen by radars with bearing deviations of 0.1 to 1 degrees.

@@ -29,17 +29,47 @@ const fn row(
     PublishedFigures { method, set, rmse_all, rmse_pos, rmse_vel, accuracy }
 }
 
-/// Tables 3 (`atc-test`) and 5 (`atc-hshm`) of the AttEnsKNets paper.
-pub const PUBLISHED: [PublishedFigures; 10] = [
+/// Tables 2 (`atc-validation`), 3 (`atc-test`) and 5 (`atc-hshm`) of the AttEnsKNets paper.
+pub const PUBLISHED: [PublishedFigures; 15] = [
+    row(
+        "average-paper",
+        "atc-validation",
+        [(249.01, 129.34), (341.25, 184.07), (79.48, 28.77)],
+        Some((33.25, 30.72)),
+    ),
+    row(
+        "classification-paper",
+        "atc-validation",
+        [(240.57, 126.27), (330.25, 179.19), (74.71, 29.69)],
+        Some((72.93, 18.43)),
+    ),
+    row(
+        "correction-paper",
+        "atc-validation",
+        [(228.65, 105.35), (317.10, 149.11), (59.61, 20.54)],
+        Some((33.25, 30.72)),
+    ),
+    row(
+        "ens-knets",
+        "atc-validation",
+        [(218.17, 97.72), (302.14, 138.41), (58.78, 19.70)],
+        Some((74.57, 17.05)),
+    ),
+    row(
+        "att-ens-kalmannets",
+        "atc-validation",
+        [(206.05, 100.04), (285.30, 141.88), (55.28, 18.81)],
+        Some((79.12, 17.23)),
+    ),
     row(
         "imm-paper",
         "atc-test",
         [(397.92, 271.54), (505.94, 336.87), (244.75, 186.53)],
         Some((40.61, 19.70)),
     ),
-    row("mnemonic-kf", "atc-test", [(507.24, 294.53), (685.85, 434.06), (157.01, 68.10)], None),
-    row("deepmtt", "atc-test", [(255.59, 231.74), (356.30, 326.96), (57.53, 29.82)], None),
-    row("trmtt", "atc-test", [(251.39, 145.95), (345.63, 208.38), (72.97, 28.07)], None),
+    row("mnemonic", "atc-test", [(507.24, 294.53), (685.85, 434.06), (157.01, 68.10)], None),
+    row("deep-mtt", "atc-test", [(255.59, 231.74), (356.30, 326.96), (57.53, 29.82)], None),
+    row("tr-mtt", "atc-test", [(251.39, 145.95), (345.63, 208.38), (72.97, 28.07)], None),
     row(
         "att-ens-kalmannets",
         "atc-test",
@@ -52,9 +82,9 @@ pub const PUBLISHED: [PublishedFigures; 10] = [
         [(471.18, 322.29), (576.85, 391.69), (332.32, 234.81)],
         Some((46.71, 18.95)),
     ),
-    row("mnemonic-kf", "atc-hshm", [(595.47, 304.13), (735.37, 482.87), (344.08, 43.30)], None),
-    row("deepmtt", "atc-hshm", [(573.12, 376.52), (789.42, 433.60), (170.25, 65.88)], None),
-    row("trmtt", "atc-hshm", [(404.25, 184.67), (521.23, 271.03), (218.13, 48.38)], None),
+    row("mnemonic", "atc-hshm", [(595.47, 304.13), (735.37, 482.87), (344.08, 43.30)], None),
+    row("deep-mtt", "atc-hshm", [(573.12, 376.52), (789.42, 433.60), (170.25, 65.88)], None),
+    row("tr-mtt", "atc-hshm", [(404.25, 184.67), (521.23, 271.03), (218.13, 48.38)], None),
     row(
         "att-ens-kalmannets",
         "atc-hshm",
@@ -101,6 +131,6 @@ mod tests {
     fn our_default_is_not_the_published_imm() {
         assert_eq!(PublishedFigures::of("imm-paper", "atc-hshm").unwrap().rmse_all.0, 471.18);
         assert!(PublishedFigures::of("imm", "atc-test").is_none());
-        assert!(PublishedFigures::of("deepmtt-paper", "atc-test").is_some());
+        assert!(PublishedFigures::of("deep-mtt-paper", "atc-test").is_some());
     }
 }

@@ -107,7 +107,7 @@ impl Results {
                     Some(sums) if sums.iter().any(|sum| sum.count() > 0) => {
                         let value = |mean: f64| if curve.root { mean.sqrt() } else { mean };
                         let values = sums.iter().map(|sum| sum.mean().map_or(f64::NAN, value)).collect();
-                        chart.with_part(name, values)
+                        chart.with_part(name, values).in_place(method)
                     }
                     _ => chart,
                 }
@@ -175,7 +175,9 @@ impl Results {
             if means.iter().all(|mean| mean.is_nan()) {
                 return chart;
             }
-            chart.with_banded_part(name, means, column(|figure| figure.lo), column(|figure| figure.hi))
+            chart
+                .with_banded_part(name, means, column(|figure| figure.lo), column(|figure| figure.hi))
+                .in_place(method)
         })
     }
 }

@@ -30,6 +30,8 @@ pub struct Chart {
 #[derive(Debug, Clone, PartialEq)]
 struct Part {
     name: String,
+    /// Its colour is the one of this number.
+    place: usize,
     values: Vec<f64>,
     /// Lower and upper edge of the band around it.
     band: Option<[Vec<f64>; 2]>,
@@ -79,7 +81,8 @@ impl Chart {
 
     /// Adds a curve: one value for each point of the abscissa. NaN leaves a gap.
     pub fn with_part(mut self, name: impl Into<String>, values: Vec<f64>) -> Chart {
-        self.parts.push(Part { name: name.into(), values, band: None });
+        let place = self.parts.len();
+        self.parts.push(Part { name: name.into(), place, values, band: None });
         self
     }
 
@@ -92,7 +95,17 @@ impl Chart {
         low: Vec<f64>,
         high: Vec<f64>,
     ) -> Chart {
-        self.parts.push(Part { name: name.into(), values, band: Some([low, high]) });
+        let place = self.parts.len();
+        self.parts.push(Part { name: name.into(), place, values, band: Some([low, high]) });
+        self
+    }
+
+    /// Draws the last curve in the colour of this number, counted from 0, so that a name has the same colour in all charts of a
+    /// report, even where others before it are missing.
+    pub fn in_place(mut self, place: usize) -> Chart {
+        if let Some(part) = self.parts.last_mut() {
+            part.place = place;
+        }
         self
     }
 
@@ -120,7 +133,12 @@ impl Chart {
                 Some([low, high]) => Some([column(low)?, column(high)?]),
                 None => None,
             };
-            parts.push(PartData { name: part.name.clone(), y: column(&part.values)?, band });
+            parts.push(PartData {
+                name: part.name.clone(),
+                place: part.place,
+                y: column(&part.values)?,
+                band,
+            });
         }
         Ok(ChartData {
             title: self.title.clone(),
@@ -147,6 +165,7 @@ pub(super) struct ChartData {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct PartData {
     name: String,
+    place: usize,
     y: Vec<Number>,
     #[serde(skip_serializing_if = "Option::is_none")]
     band: Option<[Vec<Number>; 2]>,

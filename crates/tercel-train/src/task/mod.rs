@@ -8,6 +8,8 @@ pub mod mnemonic;
 pub mod neural_imm;
 pub mod plots;
 pub mod residual;
+#[cfg(test)]
+mod shipped;
 pub mod tr_mtt;
 
 use std::ops::ControlFlow;

@@ -47,8 +47,8 @@ pub struct TrainArguments {
 
 const AFTER: &str = "\
 Examples:
-  tercel train recipes/kalman-net-2.toml
-  tercel train recipes/kalman-net-2.toml --resume
+  tercel train recipes/kalman-net-straight.toml
+  tercel train recipes/kalman-net-straight.toml --resume
   tercel train my-recipe.toml -o my-models/turns.safetensors --threads 4";
 
 impl TrainArguments {

@@ -2,55 +2,54 @@
 
 use nalgebra::DMatrix;
 
-/// Modes and the probabilities of their changes over any step: the Kronecker product of independent links.
+/// Modes and the probabilities of their changes over any step: the Kronecker product of independent links, the first of which
+/// changes slowest along the modes.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::filter) struct Chain {
     pub(super) modes: usize,
     links: Vec<Link>,
-    /// The product itself, row by row, when it is the same for every step.
-    fixed: Option<Vec<f64>>,
+}
+
+/// A link over one step.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::filter) struct Leap<'a> {
+    /// Values that the link has.
+    pub modes: usize,
+    /// From one of its values to the next, in modes of the chain.
+    pub stride: usize,
+    /// Probabilities of changes, row by row.
+    pub probabilities: &'a [f64],
+    /// The probability to stay and that of each other value, when they are the same for all values.
+    pub even: Option<[f64; 2]>,
 }
 
 impl Chain {
     pub(super) fn new(modes: usize, links: Vec<Link>) -> Chain {
-        let mut chain = Chain { modes, links, fixed: None };
-        if chain.links.iter().all(|link| link.rate.is_none()) {
-            let mut work = Vec::new();
-            chain.fixed = Some(chain.over(0.0, &mut work).to_vec());
-        }
-        chain
+        Chain { modes, links }
     }
 
-    /// The probabilities of changes over `dt`, row by row. `work` is overwritten and holds them when they had to be computed.
-    pub fn over<'a>(&'a self, dt: f64, work: &'a mut Vec<f64>) -> &'a [f64] {
-        if let Some(fixed) = &self.fixed {
-            return fixed;
-        }
-        let size = self.modes * self.modes;
-        let largest = self.links.iter().map(|link| link.modes * link.modes).max().unwrap_or(0);
-        work.clear();
-        work.resize(size + 3 * largest, 0.0);
-        let (whole, work) = work.split_at_mut(size);
-        whole[0] = 1.0;
-        let mut modes = 1;
+    /// Calls `work` with each link over `dt` that changes anything. `room` is overwritten.
+    pub fn leap(&self, dt: f64, room: &mut Vec<f64>, mut work: impl FnMut(Leap<'_>)) {
+        let largest =
+            self.links.iter().filter(|link| link.rate.is_some()).map(|link| link.modes.pow(2)).max();
+        room.resize(3 * largest.unwrap_or(0), 0.0);
+        let mut stride = self.modes;
         for link in &self.links {
-            kronecker(whole, modes, link.over(dt, work), link.modes);
-            modes *= link.modes;
+            stride /= link.modes;
+            let probabilities = link.over(dt, room);
+            let even = link.even.then(|| [probabilities[0], *probabilities.get(1).unwrap_or(&0.0)]);
+            if link.modes > 1 && even != Some([1.0, 0.0]) {
+                work(Leap { modes: link.modes, stride, probabilities, even });
+            }
         }
-        whole
     }
 }
 
-/// Multiplies the `n` x `n` matrix at the beginning of `whole` by one of `m` x `m`, in place.
-fn kronecker(whole: &mut [f64], n: usize, factor: &[f64], m: usize) {
-    // From the end: an entry is read before any of those that come from it is written over it.
-    for (i, k) in (0..n).rev().flat_map(|i| (0..m).rev().map(move |k| (i, k))) {
-        for j in (0..n).rev() {
-            let (value, start) = (whole[i * n + j], ((i * m + k) * n + j) * m);
-            for l in (0..m).rev() {
-                whole[start + l] = value * factor[k * m + l];
-            }
-        }
+impl Leap<'_> {
+    /// The sets of modes of a chain of `modes` modes that differ in this link alone: the first of each set.
+    pub fn groups(&self, modes: usize) -> impl Iterator<Item = usize> + use<> {
+        let (stride, size) = (self.stride, self.stride * self.modes);
+        (0..modes / size).flat_map(move |outer| (0..stride).map(move |inner| outer * size + inner))
     }
 }
 
@@ -61,6 +60,8 @@ pub(super) struct Link {
     /// Row by row: probabilities of a step, or the generator divided by `rate`, plus the identity.
     matrix: Vec<f64>,
     rate: Option<f64>,
+    /// Whether staying is equally probable in all modes, and so are all changes. It then is over any step.
+    even: bool,
     /// An interval and the probabilities over it, as they were stated: most scans come at this interval.
     stated: Option<(f64, Vec<f64>)>,
 }
@@ -68,7 +69,7 @@ pub(super) struct Link {
 impl Link {
     /// The same probabilities over every step.
     pub fn steps(matrix: &DMatrix<f64>) -> Link {
-        Link { modes: matrix.nrows(), matrix: rows_of(matrix), rate: None, stated: None }
+        Link { modes: matrix.nrows(), matrix: rows_of(matrix), rate: None, even: even(matrix), stated: None }
     }
 
     /// A process in continuous time.
@@ -76,12 +77,12 @@ impl Link {
         let modes = generator.nrows();
         let rate = generator.diagonal().iter().fold(0.0_f64, |top, x| top.max(-x)).max(f64::MIN_POSITIVE);
         let jumps = DMatrix::identity(modes, modes) + generator / rate;
-        Link { modes, matrix: rows_of(&jumps), rate: Some(rate), stated: None }
+        Link { modes, matrix: rows_of(&jumps), rate: Some(rate), even: even(&jumps), stated: None }
     }
 
     /// The same with the probabilities over `interval` as they were stated.
     pub fn stated(self, matrix: &DMatrix<f64>, interval: f64) -> Link {
-        Link { stated: Some((interval, rows_of(matrix))), ..self }
+        Link { stated: Some((interval, rows_of(matrix))), even: self.even && even(matrix), ..self }
     }
 
     /// The probabilities of changes over `dt`, row by row, in the matrix itself or in `work`, of three times its size.
@@ -129,6 +130,14 @@ impl Link {
         }
         sum
     }
+}
+
+fn even(matrix: &DMatrix<f64>) -> bool {
+    let change = if matrix.nrows() > 1 { matrix[(0, 1)] } else { 0.0 };
+    let expected = |i, j| if i == j { matrix[(0, 0)] } else { change };
+    let places = (0..matrix.nrows()).flat_map(|i| (0..matrix.nrows()).map(move |j| (i, j)));
+    // What a logarithm leaves of equal numbers may differ in its last digits.
+    places.into_iter().all(|(i, j)| (matrix[(i, j)] - expected(i, j)).abs() <= 1e-14)
 }
 
 fn product(n: usize, a: &[f64], b: &[f64], out: &mut [f64]) {

@@ -1,8 +1,26 @@
+use std::ops::AddAssign;
+
 use super::*;
 
+/// The probabilities of the whole chain: where each mode alone leads.
 fn over(chain: &Chain, dt: f64) -> DMatrix<f64> {
-    let mut work = Vec::new();
-    DMatrix::from_row_slice(chain.modes, chain.modes, chain.over(dt, &mut work))
+    let mut whole = DMatrix::identity(chain.modes, chain.modes);
+    chain.leap(dt, &mut Vec::new(), |leap| {
+        let mut next = DMatrix::zeros(chain.modes, chain.modes);
+        for group in leap.groups(chain.modes) {
+            for (i, j) in (0..leap.modes).flat_map(|i| (0..leap.modes).map(move |j| (i, j))) {
+                let probability = leap.probabilities[i * leap.modes + j];
+                if let Some([stay, change]) = leap.even {
+                    assert!((probability - if i == j { stay } else { change }).abs() < 1e-14);
+                }
+                let (from, to) = (group + i * leap.stride, group + j * leap.stride);
+                let flow = whole.column(from) * probability;
+                next.column_mut(to).add_assign(&flow);
+            }
+        }
+        whole = next;
+    });
+    whole
 }
 
 #[test]

@@ -13,6 +13,9 @@ use crate::air_traffic::{Method, Recording, StepEstimate};
 /// Accuracy that is assumed where none is stated: range, m, and bearing, rad.
 pub(super) const NOMINAL: (f64, f64) = (50.0, 0.5 * std::f64::consts::PI / 180.0);
 
+/// Bearing accuracies among which a filter chooses that is told none, degrees.
+pub(super) const ADAPTIVE_BEARINGS: [f64; 4] = [0.15, 0.4, 0.7, 1.0];
+
 type Belief = ImmBelief<Gaussian<4>, 4>;
 
 fn read<S>(bank: &TurnBank, filter: &Imm<Extended<Turn, S>>, belief: &Belief) -> StepEstimate
@@ -133,8 +136,7 @@ impl AdaptiveBank {
     /// # Errors
     /// Never, as long as the constants are sound.
     pub fn shipped() -> Result<Self, FilterError> {
-        let bearings = [0.15_f64, 0.4, 0.7, 1.0];
-        let accuracies = bearings.map(|degrees| (NOMINAL.0, degrees.to_radians()));
+        let accuracies = ADAPTIVE_BEARINGS.map(|degrees| (NOMINAL.0, degrees.to_radians()));
         AdaptiveBank::new(turns()?, &accuracies)
     }
 }

@@ -7,6 +7,17 @@
 //! | `imm-paper` | | the published rival: three modes, a position noise of 35 m |
 //! | `imm` | the radar's accuracy | ours: turns to ±20 °/s, polar measurements |
 //! | `imm-adaptive` | | the same when the accuracy is not stated: it is estimated |
+//! | `neural-imm` | the radar's accuracy | ours: a wider bank whose mixture a network corrects |
+//! | `neural-imm-adaptive` | | the same when the accuracy is not stated |
+//! | `kalman-net` | the radar's accuracy | a learned gain, with our inputs and covariance |
+//! | `kalman-net-paper` | | the same as published |
+//! | `att-ens-kalmannets` | the radar's accuracy | three KalmanNets with attention to innovations; causal |
+//! | `att-ens-kalmannets-causal` | | as published, but with a normalisation that knows the past alone |
+//! | `att-ens-kalmannets-paper` | all plots of the flight | as published: it normalises over the whole flight |
+//! | `mnemonic` | the radar's accuracy | a learned prediction |
+//! | `deep-mtt` | the radar's accuracy | learned residuals of an unscented filter, window of 5 |
+//! | `tr-mtt` | | a transformer on the last 25 plots, its last output |
+//! | `tr-mtt-window` | up to 24 s of the future | the same, the mean over all windows that cover a step |
 //! | `bayes` | the radar's accuracy, the population | the limit of any causal filter |
 //! | `oracle` | the radar's accuracy, every manoeuvre | a bound that no filter reaches |
 //!
@@ -14,6 +25,7 @@
 //! population.
 
 mod bank;
+mod learned;
 mod limits;
 mod single;
 
@@ -28,8 +40,36 @@ use crate::error::StudyError;
 pub use bank::{AdaptiveBank, Bank};
 
 /// Names of all methods, in the order in which they are best read.
-pub const METHODS: [&str; 8] =
-    ["measurement", "ekf", "ukf", "imm-paper", "imm", "imm-adaptive", "bayes", "oracle"];
+pub const METHODS: [&str; 19] = [
+    "measurement",
+    "ekf",
+    "ukf",
+    "imm-paper",
+    "imm",
+    "imm-adaptive",
+    "neural-imm",
+    "neural-imm-adaptive",
+    "kalman-net",
+    "kalman-net-paper",
+    "att-ens-kalmannets",
+    "att-ens-kalmannets-causal",
+    "att-ens-kalmannets-paper",
+    "mnemonic",
+    "deep-mtt",
+    "tr-mtt",
+    "tr-mtt-window",
+    "bayes",
+    "oracle",
+];
+
+/// Names of the methods of the ablation: what the parts of the published ensemble are worth, in the order of the publication.
+pub const ABLATION: [&str; 5] = [
+    "average-paper",
+    "classification-paper",
+    "correction-paper",
+    "ens-knets-paper",
+    "att-ens-kalmannets-paper",
+];
 
 /// The method of that name, for a population (one of [`NAMES`](tercel_sim::air_traffic::NAMES), of which only `bayes` makes use).
 ///
@@ -43,6 +83,23 @@ pub fn method(name: &str, population: &AirTraffic) -> Result<Box<dyn Method>, St
         "imm-paper" => Box::new(bank::Published::new()?),
         "imm" => Box::new(Bank::shipped()?),
         "imm-adaptive" => Box::new(AdaptiveBank::shipped()?),
+        "neural-imm" => learned::neural_imm()?,
+        "neural-imm-adaptive" => learned::neural_imm_adaptive()?,
+        "kalman-net" => learned::kalman_net()?,
+        "kalman-net-paper" => learned::kalman_net_paper()?,
+        "att-ens-kalmannets" => learned::ensemble("att-ens-kalmannets")?,
+        "att-ens-kalmannets-causal" => learned::published_causal_ensemble("att-ens-kalmannets-causal")?,
+        "att-ens-kalmannets-paper" => Box::new(learned::PublishedEnsemble::new(name)?),
+        "mnemonic" => learned::mnemonic()?,
+        "deep-mtt" => learned::deep_mtt()?,
+        "tr-mtt" => learned::tr_mtt()?,
+        "tr-mtt-window" => Box::new(learned::Windowed::new()?),
+        "average-paper" => Box::new(learned::PublishedEnsemble::average()?),
+        "classification-paper" => {
+            Box::new(learned::PublishedEnsemble::new("ens-knets-classification-paper")?)
+        }
+        "correction-paper" => Box::new(learned::PublishedEnsemble::new("ens-knets-correction-paper")?),
+        "ens-knets-paper" => Box::new(learned::PublishedEnsemble::new(name)?),
         "bayes" => Box::new(limits::Bayes::new(population.clone())),
         "oracle" => Box::new(limits::Oracle),
         _ => {

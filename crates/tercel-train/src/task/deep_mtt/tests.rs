@@ -1,5 +1,6 @@
 use super::*;
 use crate::backend::values;
+use crate::task::shipped;
 
 const RECIPE: &str = "
 version = 1
@@ -42,32 +43,48 @@ fn the_filter_says_what_was_trained() {
     for text in [RECIPE, &paper] {
         let (task, set) =
             task(&text.replace("windows = 6", "windows = 0").replace("steps = 60", "steps = 201"));
-        let windows = task.batch(draw(&[1])).unwrap();
-        let trained = values(&task.forward(&Weights::frozen(&set), &windows));
-        let model = Model::new(task.card(), set.tensors()).unwrap();
-        let network = Arc::new(ResidualNetwork::from_model(&model).unwrap());
-        let filter = DeepMtt::new(network, RangeBearing::new(50.0, 0.5_f64.to_radians()).unwrap());
-        let sighting = task.plots.sighting(draw(&[1]), 1).unwrap();
-        let mut belief = filter.birth(sighting.first().unwrap()).unwrap();
-        let (mut window, width) = (0, task.hyper.outputs());
-        for plot in &sighting.plots[1..] {
-            filter.predict(&mut belief, 1.0);
-            let Some(plot) = plot else { continue };
-            filter.update(&mut belief, plot).unwrap();
-            if belief.window().is_none() {
-                continue;
-            }
-            for (step, ran) in belief.outputs().chunks(width).enumerate() {
-                let trained = &trained[(step * windows.count + window) * width..][..width];
-                for (trained, ran) in trained.iter().zip(ran) {
-                    assert!((trained - ran).abs() < 1e-4 * ran.abs().max(0.1), "{window}: {trained} {ran}");
-                }
-            }
-            // The aim of the last step is what is missing to the truth: the correction of the filter reduces it likewise.
-            window += 1;
-        }
-        assert_eq!(window, windows.count);
+        agree(&task, &set);
     }
+}
+
+#[test]
+fn the_shipped_model_says_what_was_trained() {
+    for (model, text) in shipped::of_kind(DeepMttKind::NAME) {
+        let mut recipe = Recipe::<DeepMttKind>::parse(&text).unwrap();
+        (recipe.data.windows, recipe.data.steps) = (0, 201);
+        let (task, mut set) = DeepMttTask::new(&recipe).unwrap();
+        shipped::fill(&mut set, &model);
+        agree(&task, &set);
+    }
+}
+
+/// Compares the differentiable model and the filter at every window of a flight.
+fn agree(task: &DeepMttTask, set: &ParameterSet) {
+    let windows = task.batch(draw(&[1])).unwrap();
+    let trained = values(&task.forward(&Weights::frozen(set), &windows));
+    let model = Model::new(task.card(), set.tensors()).unwrap();
+    let network = Arc::new(ResidualNetwork::from_model(&model).unwrap());
+    let filter = DeepMtt::new(network, RangeBearing::new(50.0, 0.5_f64.to_radians()).unwrap());
+    let sighting = task.plots.sighting(draw(&[1]), 1).unwrap();
+    let mut belief = filter.birth(sighting.first().unwrap()).unwrap();
+    let (mut window, width) = (0, task.hyper.outputs());
+    for plot in &sighting.plots[1..] {
+        filter.predict(&mut belief, 1.0);
+        let Some(plot) = plot else { continue };
+        filter.update(&mut belief, plot).unwrap();
+        if belief.window().is_none() {
+            continue;
+        }
+        for (step, ran) in belief.outputs().chunks(width).enumerate() {
+            let trained = &trained[(step * windows.count + window) * width..][..width];
+            for (trained, ran) in trained.iter().zip(ran) {
+                assert!((trained - ran).abs() < 1e-4 * ran.abs().max(0.1), "{window}: {trained} {ran}");
+            }
+        }
+        // The aim of the last step is what is missing to the truth: the correction of the filter reduces it likewise.
+        window += 1;
+    }
+    assert_eq!(window, windows.count);
 }
 
 #[test]

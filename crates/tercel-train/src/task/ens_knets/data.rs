@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Matrix2, Vector2, Vector4};
 use rand::RngExt;
 use serde::Deserialize;
+use tercel_core::error::FilterError;
 use tercel_core::filter::Filter;
 use tercel_core::sensor::{ConvertedPolar, Measurement, Position, Sensor};
 use tercel_neural::filter::{
@@ -130,15 +131,7 @@ impl EnsembleData {
         let mut random = draw.random(sample);
         let _: f64 = random.random();
         let stated = random.random::<f64>() < self.config.stated;
-        let converter = self.converter(&radar, stated).map_err(|error| fault(&error))?;
-        let measure = |plot: &Vector2<f64>| {
-            let reading = Sensor::<4, 2>::read(&converter, &Measurement::from(*plot));
-            let measurement = Measurement::from(reading.value);
-            match self.config.deviation {
-                Some(_) => measurement,
-                None => measurement.with_noise(reading.noise),
-            }
-        };
+        let measure = self.measure(&radar, stated).map_err(|error| fault(&error))?;
         let (first, rest) = plots.split_first().ok_or_else(|| fault(&"it has no steps"))?;
         let first = first.as_ref().ok_or_else(|| fault(&"its first step was not seen"))?;
         let mut belief = self.filter.birth(&measure(first)).map_err(|error| fault(&error))?;
@@ -157,11 +150,30 @@ impl EnsembleData {
         Ok(followed)
     }
 
-    fn converter(
+    /// How plots of a radar become measurements.
+    pub fn measure(
         &self,
         radar: &Radar,
         stated: bool,
-    ) -> Result<ConvertedPolar, tercel_core::error::FilterError> {
+    ) -> Result<impl Fn(&Vector2<f64>) -> Measurement<2>, FilterError> {
+        let (converter, deviation) = (self.converter(radar, stated)?, self.config.deviation);
+        Ok(move |plot: &Vector2<f64>| {
+            let reading = Sensor::<4, 2>::read(&converter, &Measurement::from(*plot));
+            let measurement = Measurement::from(reading.value);
+            match deviation {
+                Some(_) => measurement,
+                None => measurement.with_noise(reading.noise),
+            }
+        })
+    }
+
+    /// The sensor that such measurements are of.
+    #[cfg(test)]
+    pub fn sensor(&self) -> Position<2> {
+        Position::new(self.config.deviation.unwrap_or(1.0)).unwrap()
+    }
+
+    fn converter(&self, radar: &Radar, stated: bool) -> Result<ConvertedPolar, FilterError> {
         let Accuracy { range, bearing } = self.config.nominal;
         let (range, bearing) =
             if stated { (radar.range(), radar.bearing()) } else { (range, bearing.to_radians()) };

@@ -2,11 +2,12 @@
 
 use nalgebra::Vector4;
 use tercel_core::filter::{Estimate, Filter};
-use tercel_core::sensor::{ConvertedPolar, Measurement};
+use tercel_core::sensor::Measurement;
 use tercel_neural::filter::{Architecture, EnsKNets, KalmanNetHyper, OfflineEnsKNets};
 
 use super::*;
 use crate::backend::{Tape, leaf};
+use crate::task::shipped;
 
 /// KalmanNets with random weights beside an alpha-beta filter, for straight flight and turns to both sides.
 fn nets() -> Vec<Model> {
@@ -127,15 +128,16 @@ fn estimates(task: &EnsKNetsTask, set: &ParameterSet, sample: u64) -> Vec<(Estim
     tensors.extend(task.frozen());
     let network = EnsembleNetwork::from_model(&Model::new(task.card(), tensors).unwrap()).unwrap();
     let observed = task.data.flights().observed(draw(&[sample]), sample).unwrap();
-    let radar = ConvertedPolar::new(observed.radar.range(), observed.radar.bearing()).unwrap();
+    let sensor = task.data.sensor();
+    let measure = task.data.measure(&observed.radar, true).unwrap();
     let plots: Vec<Option<Measurement<2>>> =
-        observed.plots.iter().map(|plot| plot.map(Measurement::from)).collect();
+        observed.plots.iter().map(|plot| plot.as_ref().map(&measure)).collect();
     let first = plots[0].unwrap();
     let found = if network.hyper().normalisation == Normalisation::Sequence {
-        let offline = OfflineEnsKNets::new(Arc::new(network), radar).unwrap();
+        let offline = OfflineEnsKNets::new(Arc::new(network), sensor).unwrap();
         offline.estimates(&first, plots[1..].iter().map(|plot| (1.0, *plot))).unwrap()
     } else {
-        let filter = EnsKNets::new(Arc::new(network), radar).unwrap();
+        let filter = EnsKNets::new(Arc::new(network), sensor).unwrap();
         let mut belief = filter.birth(&first).unwrap();
         let mut found = vec![filter.estimate(&belief)];
         for plot in &plots[1..] {
@@ -165,29 +167,47 @@ fn the_run_time_says_what_was_trained() {
         let data = DATA.replace("0.5", "1.0");
         let (task, mut set) = task(&data, &model, "").unwrap();
         shaken(&mut set);
-        let batch = task.batch(draw(&[4])).unwrap();
-        let flight = batch.flights.flights[0].clone();
-        assert!(flight.instants.iter().filter(|instant| instant.held > 0).count() > 30);
-        let [corrections, logits] = task.outputs(&Weights::frozen(&set), &batch).map(|x| values(&x));
-        let ran = estimates(&task, &set, 4);
-        for (instant, errors) in flight.instants.iter().zip(flight.errors.chunks(3)) {
-            let outputs = (&corrections[12 * instant.row..][..12], &logits[3 * instant.row..][..3]);
-            let fused = task.plan.fuse(instant, errors, outputs.0, outputs.1);
-            let (estimate, truth) = &ran[instant.step];
-            let error = estimate.mean - truth;
-            // Lengths, since the training sees errors in another frame.
-            for (trained, ran) in [
-                (fused.error.xy().norm(), error.xy().norm()),
-                (fused.error.fixed_rows::<2>(2).norm(), error.fixed_rows::<2>(2).norm()),
-            ] {
-                let gap = (f64::from(trained) - ran).abs();
-                assert!(gap < 1e-4 * ran + 0.02, "{model} step {}: {trained} {ran}", instant.step);
-            }
-            for (trained, ran) in fused.probabilities.iter().zip(&estimate.modes) {
-                assert!((f64::from(*trained) - ran).abs() < 1e-4, "{model} step {}", instant.step);
-            }
+        assert!(agree(&task, &set) > 30, "{model}");
+    }
+}
+
+#[test]
+fn the_shipped_models_say_what_was_trained() {
+    for (model, text) in shipped::of_kind(EnsKNetsKind::NAME) {
+        let mut recipe = Recipe::<EnsKNetsKind>::parse(&text).unwrap();
+        (recipe.data.stated, recipe.loss.usual) = (1.0, 1);
+        let net = |path: &PathBuf| shipped::model(path.file_stem().unwrap().to_str().unwrap());
+        let nets: Vec<Model> = recipe.model.nets.iter().map(net).collect();
+        let (task, mut set) = EnsKNetsTask::of_nets(&recipe, &nets).unwrap();
+        shipped::fill(&mut set, &model);
+        agree(&task, &set);
+    }
+}
+
+/// Compares the differentiable model and the run time over a flight, and says how many of its steps had no measurement.
+fn agree(task: &EnsKNetsTask, set: &ParameterSet) -> usize {
+    let batch = task.batch(draw(&[4])).unwrap();
+    let flight = batch.flights.flights[0].clone();
+    let [corrections, logits] = task.outputs(&Weights::frozen(set), &batch).map(|x| values(&x));
+    let ran = estimates(task, set, 4);
+    for (instant, errors) in flight.instants.iter().zip(flight.errors.chunks(3)) {
+        let outputs = (&corrections[12 * instant.row..][..12], &logits[3 * instant.row..][..3]);
+        let fused = task.plan.fuse(instant, errors, outputs.0, outputs.1);
+        let (estimate, truth) = &ran[instant.step];
+        let error = estimate.mean - truth;
+        // Lengths, since the training sees errors in another frame.
+        for (trained, ran) in [
+            (fused.error.xy().norm(), error.xy().norm()),
+            (fused.error.fixed_rows::<2>(2).norm(), error.fixed_rows::<2>(2).norm()),
+        ] {
+            let gap = (f64::from(trained) - ran).abs();
+            assert!(gap < 1e-4 * ran + 0.02, "step {}: {trained} {ran}", instant.step);
+        }
+        for (trained, ran) in fused.probabilities.iter().zip(&estimate.modes) {
+            assert!((f64::from(*trained) - ran).abs() < 1e-4, "step {}", instant.step);
         }
     }
+    flight.instants.iter().filter(|instant| instant.held > 0).count()
 }
 
 #[test]

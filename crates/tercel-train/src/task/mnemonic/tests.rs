@@ -2,6 +2,7 @@ use tercel_core::filter::Filter;
 use tercel_neural::filter::{MnemonicKalman, MnemonicNetwork};
 
 use super::*;
+use crate::task::shipped;
 
 const RECIPE: &str = "
 version = 1
@@ -44,37 +45,50 @@ fn the_filter_does_what_was_trained() {
         .replace("corrections = true", "corrections = false");
     for text in [RECIPE, &paper] {
         let (task, set) = task(text);
-        let flown = task.batch(draw(&[1, 2])).unwrap();
-        let model = Model::new(task.card(), set.tensors()).unwrap();
-        let network = Arc::new(MnemonicNetwork::from_model(&model).unwrap());
-        let filter = MnemonicKalman::new(network, task.sensor);
-        let sightings: Vec<_> =
-            [1, 2].map(|sample| task.plots.sighting(draw(&[1, 2]), sample).unwrap()).into();
-        let mut beliefs: Vec<_> =
-            sightings.iter().map(|sighting| filter.birth(sighting.first().unwrap()).unwrap()).collect();
-        let weights = Weights::frozen(&set);
-        let mut state = task.first(&flown);
-        for step in 1..=200 {
-            state = task.step(&weights, &flown, state, step);
-            let found = values(&state.posterior());
-            for (member, (belief, sighting)) in beliefs.iter_mut().zip(&sightings).enumerate() {
-                filter.predict(belief, 1.0);
-                if let Some(plot) = &sighting.plots[step] {
-                    filter.update(belief, plot).unwrap();
-                }
-                let ran = filter.state(belief);
-                let trained = gaussian(&found[member * GAUSSIAN..][..GAUSSIAN]);
-                let origin = Vector2::new(flown.origins[2 * member], flown.origins[2 * member + 1]);
-                let deviations = ran.deviations();
-                for i in 0..4 {
-                    let origin = if i < 2 { origin[i] } else { 0.0 };
-                    let error = (trained.mean[i] + origin - ran.mean[i]).abs();
-                    let scale = (ran.mean[i] - origin).abs().max(100.0) + deviations[i];
-                    assert!(error < 1e-4 * scale, "step {step}, {i}: {error}");
-                }
-                let off = (trained.covariance - ran.covariance).norm() / ran.covariance.norm();
-                assert!(off < 1e-3, "step {step}: {off}");
+        agree(&task, &set);
+    }
+}
+
+#[test]
+fn the_shipped_model_does_what_was_trained() {
+    for (model, text) in shipped::of_kind(MnemonicKind::NAME) {
+        let (task, mut set) = MnemonicTask::new(&Recipe::parse(&text).unwrap()).unwrap();
+        shipped::fill(&mut set, &model);
+        agree(&task, &set);
+    }
+}
+
+/// Compares the differentiable model and the filter over two flights.
+fn agree(task: &MnemonicTask, set: &ParameterSet) {
+    let flown = task.batch(draw(&[1, 2])).unwrap();
+    let model = Model::new(task.card(), set.tensors()).unwrap();
+    let network = Arc::new(MnemonicNetwork::from_model(&model).unwrap());
+    let filter = MnemonicKalman::new(network, task.sensor);
+    let sightings: Vec<_> = [1, 2].map(|sample| task.plots.sighting(draw(&[1, 2]), sample).unwrap()).into();
+    let mut beliefs: Vec<_> =
+        sightings.iter().map(|sighting| filter.birth(sighting.first().unwrap()).unwrap()).collect();
+    let weights = Weights::frozen(set);
+    let mut state = task.first(&flown);
+    for step in 1..=200 {
+        state = task.step(&weights, &flown, state, step);
+        let found = values(&state.posterior());
+        for (member, (belief, sighting)) in beliefs.iter_mut().zip(&sightings).enumerate() {
+            filter.predict(belief, 1.0);
+            if let Some(plot) = &sighting.plots[step] {
+                filter.update(belief, plot).unwrap();
             }
+            let ran = filter.state(belief);
+            let trained = gaussian(&found[member * GAUSSIAN..][..GAUSSIAN]);
+            let origin = Vector2::new(flown.origins[2 * member], flown.origins[2 * member + 1]);
+            let deviations = ran.deviations();
+            for i in 0..4 {
+                let origin = if i < 2 { origin[i] } else { 0.0 };
+                let error = (trained.mean[i] + origin - ran.mean[i]).abs();
+                let scale = (ran.mean[i] - origin).abs().max(100.0) + deviations[i];
+                assert!(error < 1e-4 * scale, "step {step}, {i}: {error}");
+            }
+            let off = (trained.covariance - ran.covariance).norm() / ran.covariance.norm();
+            assert!(off < 1e-3, "step {step}: {off}");
         }
     }
 }

@@ -8,6 +8,7 @@ use tercel_sim::air_traffic::AirTraffic;
 
 use super::*;
 use crate::backend::{Tape, leaf};
+use crate::task::shipped;
 
 const RECIPE: &str = "
 version = 1
@@ -92,10 +93,24 @@ fn the_filter_says_what_was_trained() {
     for (index, (_, values)) in set.values_mut().enumerate() {
         values.iter_mut().enumerate().for_each(|(i, value)| *value += 0.1 * ((i + index) as f32).sin());
     }
+    agree(&task, &set, 40);
+}
+
+#[test]
+fn the_shipped_model_says_what_was_trained() {
+    for (model, text) in shipped::of_kind(NeuralImmKind::NAME) {
+        let (task, mut set) = NeuralImmTask::new(&Recipe::parse(&text).unwrap()).unwrap();
+        shipped::fill(&mut set, &model);
+        agree(&task, &set, 201);
+    }
+}
+
+/// Compares both on a flight of this many steps.
+fn agree(task: &NeuralImmTask, set: &ParameterSet, steps: usize) {
     let network =
         Arc::new(BankNetwork::from_model(&Model::new(task.card(), set.tensors()).unwrap()).unwrap());
     let filter = NeuralImm::new(network, &[RangeBearing::new(50.0, 0.01).unwrap()]).unwrap();
-    let flight = AirTraffic::training().with_steps(40).unwrap().flight(5, 2);
+    let flight = AirTraffic::training().with_steps(steps).unwrap().flight(5, 2);
     let plots = flight.observe(&flight.radar(), 5, 2);
     let mut belief = filter.birth(&Measurement::from(plots[0].unwrap())).unwrap();
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
@@ -105,8 +120,8 @@ fn the_filter_says_what_was_trained() {
         inputs.extend_from_slice(belief.inputs());
         outputs.extend_from_slice(belief.outputs());
     }
-    let weights = Weights::frozen(&set);
-    let mut x = task.input.forward(&weights, constant(inputs, [39, task.hyper.inputs()]));
+    let weights = Weights::frozen(set);
+    let mut x = task.input.forward(&weights, constant(inputs, [steps - 1, task.hyper.inputs()]));
     for layer in &task.recurrent {
         x = layer.forward(&weights, x, layer.zero(1));
     }

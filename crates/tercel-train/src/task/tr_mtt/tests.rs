@@ -1,5 +1,6 @@
 use super::*;
 use crate::backend::values;
+use crate::task::shipped;
 
 const RECIPE: &str = "
 version = 1
@@ -43,28 +44,44 @@ fn the_filter_says_what_was_trained() {
     for text in [RECIPE.to_owned(), RECIPE.replace("= true", "= false")] {
         let text = text.replace("windows = 6", "windows = 0").replace("steps = 60", "steps = 201");
         let (task, set) = task(&text);
-        let windows = task.batch(draw(&[1])).unwrap();
-        let trained = values(&task.forward(&Weights::frozen(&set), &windows));
-        let model = Model::new(task.card(), set.tensors()).unwrap();
-        let network = Arc::new(TransformerNetwork::from_model(&model).unwrap());
-        let sensor = ConvertedPolar::new(50.0, 0.5_f64.to_radians()).unwrap();
-        let filter = TrMtt::new(network, sensor);
-        let sighting = task.plots.sighting(draw(&[1]), 1).unwrap();
-        let mut belief = filter.birth(sighting.first().unwrap()).unwrap();
-        let mut trained = trained.chunks(task.hyper.outputs() * task.hyper.window);
-        for plot in &sighting.plots[1..] {
-            filter.predict(&mut belief, 1.0);
-            let Some(plot) = plot else { continue };
-            filter.update(&mut belief, plot).unwrap();
-            if belief.window().iter().flatten().count() < 2 {
-                continue;
-            }
-            for (trained, ran) in trained.next().unwrap().iter().zip(belief.outputs()) {
-                assert!((trained - ran).abs() < 1e-4 * ran.abs().max(0.1), "{trained} {ran}");
-            }
-        }
-        assert!(trained.next().is_none());
+        agree(&task, &set);
     }
+}
+
+#[test]
+fn the_shipped_model_says_what_was_trained() {
+    for (model, text) in shipped::of_kind(TrMttKind::NAME) {
+        let mut recipe = Recipe::<TrMttKind>::parse(&text).unwrap();
+        (recipe.data.windows, recipe.data.steps) = (0, 201);
+        let (task, mut set) = TrMttTask::new(&recipe).unwrap();
+        shipped::fill(&mut set, &model);
+        agree(&task, &set);
+    }
+}
+
+/// Compares the differentiable model and the filter at every window of a flight.
+fn agree(task: &TrMttTask, set: &ParameterSet) {
+    let windows = task.batch(draw(&[1])).unwrap();
+    let trained = values(&task.forward(&Weights::frozen(set), &windows));
+    let model = Model::new(task.card(), set.tensors()).unwrap();
+    let network = Arc::new(TransformerNetwork::from_model(&model).unwrap());
+    let sensor = ConvertedPolar::new(50.0, 0.5_f64.to_radians()).unwrap();
+    let filter = TrMtt::new(network, sensor);
+    let sighting = task.plots.sighting(draw(&[1]), 1).unwrap();
+    let mut belief = filter.birth(sighting.first().unwrap()).unwrap();
+    let mut trained = trained.chunks(task.hyper.outputs() * task.hyper.window);
+    for plot in &sighting.plots[1..] {
+        filter.predict(&mut belief, 1.0);
+        let Some(plot) = plot else { continue };
+        filter.update(&mut belief, plot).unwrap();
+        if belief.window().iter().flatten().count() < 2 {
+            continue;
+        }
+        for (trained, ran) in trained.next().unwrap().iter().zip(belief.outputs()) {
+            assert!((trained - ran).abs() < 1e-4 * ran.abs().max(0.1), "{trained} {ran}");
+        }
+    }
+    assert!(trained.next().is_none());
 }
 
 #[test]
