@@ -1,6 +1,7 @@
 //! What every filter with a Gaussian belief answers alike.
 
 use std::borrow::Borrow;
+use std::ops::AddAssign;
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -60,18 +61,28 @@ pub(super) fn reach<const N: usize, const M: usize>(
 /// The Gaussian with the moments of a mixture, relative to the sum of its weights. An empty one has no moments: zeros.
 #[inline]
 pub(super) fn moments<const N: usize, G: Borrow<Gaussian<N>>>(
-    parts: impl Iterator<Item = (f64, G)>,
+    parts: impl Iterator<Item = (f64, G)> + Clone,
 ) -> Gaussian<N> {
     let mut merged = Gaussian { mean: SVector::zeros(), covariance: SMatrix::zeros() };
+    // Relative to the first mean: positions may be large against what lies between them.
+    let Some(start) = parts.clone().next().map(|(_, part)| part.borrow().mean) else { return merged };
     let mut total = 0.0;
-    for (weight, part) in parts {
-        if total == 0.0 {
-            merged = *part.borrow();
-        } else {
-            merged.merge(total, part.borrow(), weight);
-        }
+    for (weight, part) in parts.clone() {
+        merged.mean += (part.borrow().mean - start) * weight;
         total += weight;
     }
+    merged.mean = start + merged.mean / total;
+    for (weight, part) in parts {
+        let Gaussian { mean, covariance } = part.borrow();
+        let difference = mean - merged.mean;
+        let weighted = difference * weight;
+        // Column by column, which needs no matrix in between.
+        for column in 0..N {
+            let of = covariance.column(column) * weight + difference * weighted[column];
+            merged.covariance.column_mut(column).add_assign(&of);
+        }
+    }
+    merged.covariance /= total;
     settle(&mut merged);
     merged
 }

@@ -41,7 +41,7 @@ pub(super) fn mix<const N: usize>(origins: &mut [Origin<N>], leap: &Leap<'_>) {
 }
 
 /// Every mode keeps a share of its own, and gets an equal share of all modes together.
-fn mix_evenly<const N: usize, I: Iterator<Item = usize>>(
+fn mix_evenly<const N: usize, I: Iterator<Item = usize> + Clone>(
     origins: &mut [Origin<N>],
     group: impl Fn() -> I,
     [own, common]: [f64; 2],
@@ -62,7 +62,7 @@ fn mix_evenly<const N: usize, I: Iterator<Item = usize>>(
 }
 
 /// The mode `to`, which is value `j` of the link, gets what flows from each mode of its group.
-fn mix_into<const N: usize, I: Iterator<Item = usize>>(
+fn mix_into<const N: usize, I: Iterator<Item = usize> + Clone>(
     origins: &mut [Origin<N>],
     group: impl Fn() -> I,
     leap: &Leap<'_>,
