@@ -8,6 +8,7 @@ use super::transition::Chain;
 use super::{Estimate, Filter, Innovation, Transition};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
+use crate::extended::InverseWishart;
 
 /// Estimates a state whose motion changes between models, with one filter per model and their probabilities.
 ///
@@ -21,7 +22,7 @@ use crate::error::FilterError;
 /// mean of those of the modes under `c`, and the normalised square their mean under the new `μ`.
 ///
 /// Any filter can be a mode: a learned one keeps its memory, because mixing replaces only mean and covariance
-/// ([`set_state`](Filter::set_state)). Filters of different types go in boxes, and a model with a smaller state in
+/// ([`set_state`](Filter::set_state)). Extents of random-matrix filters are mixed to their moments, too. Filters of different types go in boxes, and a model with a smaller state in
 /// [`Padded`](super::Padded).
 ///
 /// A mode whose update fails keeps its belief, gets a vanishing probability and restarts from the others at the next mixing;
@@ -73,6 +74,7 @@ pub struct ImmBelief<B, const N: usize> {
 struct Mode<B, const N: usize> {
     belief: B,
     state: Gaussian<N>,
+    extent: Option<InverseWishart>,
     weight: f64,
 }
 
@@ -163,6 +165,7 @@ impl<F> Imm<F> {
         let transition = self.chain.over(dt, transition);
         for (mode, filter) in modes.iter_mut().zip(&self.filters) {
             mode.state = filter.state(&mode.belief);
+            mode.extent = filter.extent(&mode.belief);
         }
         for (j, filter) in self.filters.iter().enumerate() {
             let flow = |i: usize| probabilities[i] * transition[i * count + j];
@@ -177,6 +180,10 @@ impl<F> Imm<F> {
                 });
                 let mixed = moments(parts);
                 filter.set_state(&mut modes[j].belief, &mixed);
+                let extents = (0..count).map(|i| (flow(i), modes[i].extent));
+                if let Some(mixed) = blended(extents) {
+                    filter.set_extent(&mut modes[j].belief, &mixed);
+                }
             }
         }
         for (probability, mode) in probabilities.iter_mut().zip(modes) {
@@ -196,7 +203,8 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
             .map(|filter| {
                 let belief = filter.birth(measurement)?;
                 let state = filter.state(&belief);
-                Ok(Mode { belief, state, weight: 0.0 })
+                let extent = filter.extent(&belief);
+                Ok(Mode { belief, state, extent, weight: 0.0 })
             })
             .collect();
         Ok(ImmBelief { modes: modes?, probabilities: self.initial.clone(), transition: Vec::new() })
@@ -287,7 +295,25 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
 
     fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
         let state = self.state(belief);
-        Estimate { mean: state.mean, covariance: state.covariance, modes: belief.probabilities.clone() }
+        let parts = || belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
+        let total: f64 = belief.probabilities.iter().sum();
+        let share = |((mode, filter), probability): ((&Mode<_, N>, &F), &f64)| {
+            Some(filter.estimate(&mode.belief).extent? * (probability / total))
+        };
+        let extent = parts().map(share).sum::<Option<_>>().filter(|_| !self.filters.is_empty());
+        Estimate { modes: belief.probabilities.clone(), extent, ..state.into() }
+    }
+
+    fn extent(&self, belief: &Self::Belief) -> Option<InverseWishart> {
+        let modes = belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
+        blended(modes.map(|((mode, filter), probability)| (*probability, filter.extent(&mode.belief))))
+    }
+
+    /// Every mode gets this extent.
+    fn set_extent(&self, belief: &mut Self::Belief, extent: &InverseWishart) {
+        for (mode, filter) in belief.modes.iter_mut().zip(&self.filters) {
+            filter.set_extent(&mut mode.belief, extent);
+        }
     }
 
     fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
@@ -313,6 +339,25 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
     fn area(&self, measurement: &F::Measurement) -> f64 {
         self.filters.first().map_or(1.0, |filter| filter.area(measurement))
     }
+
+    fn ln_clutter(&self, measurement: &F::Measurement, intensity: f64) -> f64 {
+        self.filters.first().map_or(0.0, |filter| filter.ln_clutter(measurement, intensity))
+    }
+}
+
+/// The extent with the moments of a mixture; none unless every part has one.
+fn blended(parts: impl Iterator<Item = (f64, Option<InverseWishart>)>) -> Option<InverseWishart> {
+    let mut merged: Option<InverseWishart> = None;
+    let mut total = 0.0;
+    for (weight, extent) in parts {
+        let extent = extent?;
+        match &mut merged {
+            Some(merged) => merged.merge(total, &extent, weight),
+            None => merged = Some(extent),
+        }
+        total += weight;
+    }
+    merged
 }
 
 /// The error of a step in which no mode could be updated.
