@@ -43,7 +43,7 @@ pub use mem_ekf::{MemEkf, Shaped};
 pub use mem_rbpf::{MemRbpf, ShapeParticle, ShapeParticles};
 pub use partition::distance_partition;
 pub use points::Points;
-pub use random_matrix::{Evolution, Extended, RandomMatrix, Rule};
+pub use random_matrix::{Evolution, GaussianInverseWishart, RandomMatrix, Rule};
 pub use rate::Rate;
 pub use scattering::Scattering;
 pub(crate) use symmetric::{congruent, rotation};

@@ -52,7 +52,7 @@ use crate::sensor::{Measurement, Position, Sensor};
 /// let size = InverseWishart::new(matrix![9.0, 0.0; 0.0, 4.0], 10.0)?;
 /// let filter = RandomMatrix::new(ConstantVelocity::new(1.0), lidar, size, Evolution::forget(20.0)?, Rule::Distorted);
 /// let car = |x: f64| Points::from_iter([[x - 2.0, 0.9], [x + 2.0, 0.9], [x - 2.0, -0.9], [x + 2.0, -0.9]]);
-/// let mut belief: tercel_core::extended::Extended<4> = filter.birth(&car(0.0))?;
+/// let mut belief: tercel_core::extended::GaussianInverseWishart<4> = filter.birth(&car(0.0))?;
 /// for second in 1..=20 {
 ///     filter.predict(&mut belief, 1.0);
 ///     filter.update(&mut belief, &car(10.0 * second as f64))?;
@@ -161,7 +161,7 @@ impl Evolution {
 
 /// What a [`RandomMatrix`] filter knows of one object.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extended<const N: usize> {
+pub struct GaussianInverseWishart<const N: usize> {
     /// The state of its centre.
     pub state: Gaussian<N>,
     /// Its extent; with [`Rule::Direct`] the covariance of its points.
@@ -207,7 +207,7 @@ impl<T> RandomMatrix<T> {
     }
 
     /// The expected extent matrix of a belief, m².
-    pub fn extent_of<const N: usize>(&self, belief: &Extended<N>) -> Matrix2<f64> {
+    pub fn extent_of<const N: usize>(&self, belief: &GaussianInverseWishart<N>) -> Matrix2<f64> {
         match self.rule {
             Rule::Direct => self.scattering.extent(&belief.extent.mean()),
             Rule::Distorted | Rule::Variational { .. } => belief.extent.mean(),
@@ -226,7 +226,7 @@ impl<T> RandomMatrix<T> {
     /// Conditions state and extent on at least one point.
     fn condition<const N: usize>(
         &self,
-        belief: &Extended<N>,
+        belief: &GaussianInverseWishart<N>,
         points: &Points,
     ) -> Result<Step<N>, FilterError> {
         let count = points.count() as f64;
@@ -257,7 +257,7 @@ impl<T> RandomMatrix<T> {
     #[inline]
     fn squares<const N: usize>(
         &self,
-        belief: &Extended<N>,
+        belief: &GaussianInverseWishart<N>,
         points: &Points,
         spread: &Matrix2<f64>,
     ) -> Matrix2<f64> {
@@ -299,10 +299,10 @@ pub(super) fn position_covariance<const N: usize>(state: &Gaussian<N>) -> Matrix
 }
 
 impl<const N: usize, T: Motion<N>> Filter<N> for RandomMatrix<T> {
-    type Belief = Extended<N>;
+    type Belief = GaussianInverseWishart<N>;
     type Measurement = Points;
 
-    fn birth(&self, points: &Points) -> Result<Extended<N>, FilterError> {
+    fn birth(&self, points: &Points) -> Result<GaussianInverseWishart<N>, FilterError> {
         points.check_birth()?;
         let (sensor, mean) = centre(&self.spread(&self.prior.mean()), points)?;
         let state = sensor.birth(&mean, &self.motion.prior())?;
@@ -317,11 +317,11 @@ impl<const N: usize, T: Motion<N>> Filter<N> for RandomMatrix<T> {
         };
         // The mean is spent on the position; the rest tells the extent.
         extent.add(&scatter, points.count() as f64 - 1.0);
-        Ok(Extended { state, extent, rate })
+        Ok(GaussianInverseWishart { state, extent, rate })
     }
 
     #[inline]
-    fn predict(&self, belief: &mut Extended<N>, dt: f64) {
+    fn predict(&self, belief: &mut GaussianInverseWishart<N>, dt: f64) {
         belief.state = predicted(&self.motion, &belief.state, dt);
         if dt == 0.0 {
             return;
@@ -333,7 +333,11 @@ impl<const N: usize, T: Motion<N>> Filter<N> for RandomMatrix<T> {
     }
 
     #[inline]
-    fn update(&self, belief: &mut Extended<N>, points: &Points) -> Result<Innovation, FilterError> {
+    fn update(
+        &self,
+        belief: &mut GaussianInverseWishart<N>,
+        points: &Points,
+    ) -> Result<Innovation, FilterError> {
         points.check()?;
         let (rate, ln_count) = self.follow_rate(belief.rate, points.count());
         if points.is_empty() {
@@ -342,11 +346,17 @@ impl<const N: usize, T: Motion<N>> Filter<N> for RandomMatrix<T> {
         }
         let Step { state, extent, mut innovation } = self.condition(belief, points)?;
         innovation.log_likelihood += ln_count;
-        *belief = Extended { state, extent, rate };
+        *belief = GaussianInverseWishart { state, extent, rate };
         Ok(innovation)
     }
 
-    fn merge(&self, belief: &mut Extended<N>, weight: f64, other: &Extended<N>, other_weight: f64) {
+    fn merge(
+        &self,
+        belief: &mut GaussianInverseWishart<N>,
+        weight: f64,
+        other: &GaussianInverseWishart<N>,
+        other_weight: f64,
+    ) {
         belief.state.merge(weight, &other.state, other_weight);
         belief.extent.merge(weight, &other.extent, other_weight);
         if let (Some(rate), Some(other)) = (&mut belief.rate, &other.rate) {
@@ -354,19 +364,19 @@ impl<const N: usize, T: Motion<N>> Filter<N> for RandomMatrix<T> {
         }
     }
 
-    fn estimate(&self, belief: &Extended<N>) -> Estimate<N> {
+    fn estimate(&self, belief: &GaussianInverseWishart<N>) -> Estimate<N> {
         Estimate { extent: Some(self.extent_of(belief)), ..belief.state.into() }
     }
 
-    fn extent(&self, belief: &Extended<N>) -> Option<InverseWishart> {
+    fn extent(&self, belief: &GaussianInverseWishart<N>) -> Option<InverseWishart> {
         Some(belief.extent)
     }
 
-    fn set_extent(&self, belief: &mut Extended<N>, extent: &InverseWishart) {
+    fn set_extent(&self, belief: &mut GaussianInverseWishart<N>, extent: &InverseWishart) {
         belief.extent = *extent;
     }
 
-    fn reach(&self, belief: &Extended<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn reach(&self, belief: &GaussianInverseWishart<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         let state = &belief.state;
         let spread = self.spread(&belief.extent.mean());
         Some((Vector2::new(state.mean[0], state.mean[1]), position_covariance(state) + spread))

@@ -113,11 +113,7 @@ impl Whitened {
             .map(|place| {
                 let from = angles[place];
                 let to = angles.get(place + 1).copied().unwrap_or(angles[0] + std::f64::consts::TAU);
-                if self.outside(0.5 * (from + to)) < 0.0 {
-                    self.arc(from, to)
-                } else {
-                    self.circle_arc(from, to)
-                }
+                if self.is_within(from, to) { self.arc(from, to) } else { self.circle_arc(from, to) }
             })
             .sum()
     }
@@ -125,7 +121,8 @@ impl Whitened {
     /// Whether an arc between two crossings lies in the circle. It may touch the circle at one point, so two are asked, and the one
     /// that is farther from the circle decides.
     fn is_within(&self, from: f64, to: f64) -> bool {
-        let (first, second) = (self.outside(from + 0.4 * (to - from)), self.outside(from + 0.7 * (to - from)));
+        let (first, second) =
+            (self.outside(from + 0.4 * (to - from)), self.outside(from + 0.7 * (to - from)));
         if first.abs() > second.abs() { first < 0.0 } else { second < 0.0 }
     }
 

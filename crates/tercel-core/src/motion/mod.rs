@@ -8,7 +8,7 @@
 //! | [`Singer`] | positions, velocities, accelerations | with an acceleration that fades |
 //! | [`Turn`] | `x, y, vx, vy` | on a circle, at a known rate |
 //! | [`AutoRegressive`] | `x, y`, velocities of the last steps | with a velocity that depends on those before |
-//! | [`Padded`] | that of a larger model | as a model with a smaller state |
+//! | [`PaddedMotion`] | that of a larger model | as a model with a smaller state |
 //! | [`CoordinatedTurn`] | `x, y, vx, vy, turn rate` | on a circle, at a rate that is estimated |
 //!
 //! The first four work in any number of dimensions: one per axis, two in the plane, three in space.
@@ -31,7 +31,7 @@ pub use auto_regressive::{AutoRegressive, Kinematics};
 pub use constant_acceleration::ConstantAcceleration;
 pub use constant_velocity::ConstantVelocity;
 pub use coordinated_turn::CoordinatedTurn;
-pub use padded::Padded;
+pub use padded::PaddedMotion;
 pub use random_walk::RandomWalk;
 pub use singer::Singer;
 pub use turn::Turn;

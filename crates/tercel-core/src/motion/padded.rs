@@ -22,22 +22,22 @@ use crate::belief::Gaussian;
 ///
 /// ```
 /// use nalgebra::{SVector, vector};
-/// use tercel_core::motion::{ConstantVelocity, Motion, Padded};
+/// use tercel_core::motion::{ConstantVelocity, Motion, PaddedMotion};
 ///
-/// let straight = Padded::<_, 4>::new(ConstantVelocity::new(0.1), 2.0);
+/// let straight = PaddedMotion::<_, 4>::new(ConstantVelocity::new(0.1), 2.0);
 /// let after: SVector<f64, 6> = straight.transition(&vector![0.0, 0.0, 3.0, 1.0, 9.0, 9.0], 2.0);
 /// assert_eq!(after, vector![6.0, 2.0, 3.0, 1.0, 0.0, 0.0]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Padded<T, const K: usize> {
+pub struct PaddedMotion<T, const K: usize> {
     motion: T,
     variance: f64,
 }
 
-impl<T, const K: usize> Padded<T, K> {
+impl<T, const K: usize> PaddedMotion<T, K> {
     /// A model of the first `K` components, and the standard deviation of each missing one, in its own unit.
     pub fn new(motion: T, deviation: f64) -> Self {
-        Padded { motion, variance: deviation * deviation }
+        PaddedMotion { motion, variance: deviation * deviation }
     }
 
     /// A matrix with this leading block, and this value on the rest of the diagonal.
@@ -55,7 +55,7 @@ fn leading<const N: usize, const K: usize>(state: &SVector<f64, N>) -> SVector<f
     SVector::from_fn(|i, _| state[i])
 }
 
-impl<const N: usize, const K: usize, T: Motion<K>> Motion<N> for Padded<T, K> {
+impl<const N: usize, const K: usize, T: Motion<K>> Motion<N> for PaddedMotion<T, K> {
     fn transition(&self, state: &SVector<f64, N>, dt: f64) -> SVector<f64, N> {
         if dt == 0.0 {
             return *state;
@@ -66,21 +66,21 @@ impl<const N: usize, const K: usize, T: Motion<K>> Motion<N> for Padded<T, K> {
 
     fn jacobian(&self, state: &SVector<f64, N>, dt: f64) -> SMatrix<f64, N, N> {
         let rest = if dt == 0.0 { 1.0 } else { 0.0 };
-        Padded::<T, K>::whole(&self.motion.jacobian(&leading(state), dt), rest)
+        PaddedMotion::<T, K>::whole(&self.motion.jacobian(&leading(state), dt), rest)
     }
 
     fn noise(&self, state: &SVector<f64, N>, dt: f64) -> SMatrix<f64, N, N> {
         let rest = if dt == 0.0 { 0.0 } else { self.variance };
-        Padded::<T, K>::whole(&self.motion.noise(&leading(state), dt), rest)
+        PaddedMotion::<T, K>::whole(&self.motion.noise(&leading(state), dt), rest)
     }
 
     fn prior(&self) -> Gaussian<N> {
         let Gaussian { mean, covariance } = self.motion.prior();
         Gaussian {
             mean: SVector::from_fn(|i, _| if i < K { mean[i] } else { 0.0 }),
-            covariance: Padded::<T, K>::whole(&covariance, self.variance),
+            covariance: PaddedMotion::<T, K>::whole(&covariance, self.variance),
         }
     }
 }
 
-impl<const N: usize, const K: usize, T: LinearMotion<K>> LinearMotion<N> for Padded<T, K> {}
+impl<const N: usize, const K: usize, T: LinearMotion<K>> LinearMotion<N> for PaddedMotion<T, K> {}

@@ -72,7 +72,12 @@ impl Crossing {
     /// When it is negative or above 10⁶.
     pub fn with_clutter(self, clutter: f64) -> Result<Self, SimulationError> {
         let expected = "it must be between 0 and a million";
-        SimulationError::unless((0.0..=1e6).contains(&clutter), "mean number of false points", clutter, expected)?;
+        SimulationError::unless(
+            (0.0..=1e6).contains(&clutter),
+            "mean number of false points",
+            clutter,
+            expected,
+        )?;
         Ok(Crossing { clutter, ..self })
     }
 
@@ -118,9 +123,10 @@ impl Crossing {
                     }
                 }
                 let count = clutter.map_or(0.0, |clutter| clutter.sample(&mut chance)) as usize;
-                points.extend((0..count).map(|_| {
-                    Vector2::from_fn(|_, _| HALF_SIDE * (2.0 * noise.random::<f64>() - 1.0))
-                }));
+                points.extend(
+                    (0..count)
+                        .map(|_| Vector2::from_fn(|_, _| HALF_SIDE * (2.0 * noise.random::<f64>() - 1.0))),
+                );
                 shuffle(&mut points, &mut noise);
                 points
             })
@@ -133,7 +139,8 @@ impl Crossing {
         let mut uniform = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
         let starts: Vec<_> = (0..self.objects)
             .map(|object| {
-                let angle = (object as f64 + uniform(-0.25, 0.25)) * std::f64::consts::TAU / self.objects as f64;
+                let angle =
+                    (object as f64 + uniform(-0.25, 0.25)) * std::f64::consts::TAU / self.objects as f64;
                 let from = Vector2::new(angle.cos(), angle.sin()) * START;
                 let aim = Vector2::new(uniform(-8.0, 8.0), uniform(-8.0, 8.0));
                 let velocity = (aim - from).normalize() * uniform(7.0, 9.0);
@@ -144,7 +151,8 @@ impl Crossing {
             let mut states = Vec::with_capacity(self.steps);
             for _ in 0..self.steps {
                 states.push(Vector4::new(place.x, place.y, velocity.x, velocity.y));
-                velocity += Vector2::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut random) }) * DENSITY.sqrt();
+                velocity +=
+                    Vector2::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut random) }) * DENSITY.sqrt();
                 place += velocity;
             }
             let angles = states.iter().map(|state| state.w.atan2(state.z)).collect();

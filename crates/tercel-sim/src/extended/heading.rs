@@ -56,8 +56,9 @@ impl Heading {
             .map(|step| {
                 let side = if self == Heading::Course { 0 } else { SIDE };
                 let around = &states[step.saturating_sub(side)..(step + side + 1).min(states.len())];
-                let velocity = around.iter().map(|state| Vector2::new(state.z, state.w)).sum::<Vector2<f64>>()
-                    / around.len() as f64;
+                let velocity =
+                    around.iter().map(|state| Vector2::new(state.z, state.w)).sum::<Vector2<f64>>()
+                        / around.len() as f64;
                 let speed = velocity.norm();
                 if speed >= STANDING {
                     last = velocity.y.atan2(velocity.x);

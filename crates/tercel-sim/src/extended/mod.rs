@@ -45,7 +45,12 @@ impl Ride {
         axes: Vector2<f64>,
     ) -> Result<Self, SimulationError> {
         let unless = SimulationError::unless;
-        unless(interval > 0.0 && interval.is_finite(), "time between steps", interval, "it must be positive")?;
+        unless(
+            interval > 0.0 && interval.is_finite(),
+            "time between steps",
+            interval,
+            "it must be positive",
+        )?;
         let count = angles.len() as f64;
         unless(angles.len() == states.len(), "number of angles", count, "there must be one per state")?;
         for axis in axes.iter().copied() {

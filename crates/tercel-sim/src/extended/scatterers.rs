@@ -47,7 +47,8 @@ impl Scatterers {
         let least = tercel_core::extended::eigen(&noise).0.y;
         unless(least >= 0.0, "eigenvalue of the noise of points", least, "it must not be negative")?;
         let counts = Poisson::new(mean);
-        let counts = counts.map_err(|_| SimulationError { what: "mean number of points", value: mean, expected })?;
+        let counts =
+            counts.map_err(|_| SimulationError { what: "mean number of points", value: mean, expected })?;
         Ok(Scatterers { counts, mean, empty: true, noise, root: root(&noise) })
     }
 
@@ -86,7 +87,8 @@ impl Scatterers {
         let (sine, cosine) = ellipse.angle.sin_cos();
         let root = self.root;
         (0..count).map(move |_| {
-            let (radius, angle) = (random.random::<f64>().sqrt(), random.random::<f64>() * std::f64::consts::TAU);
+            let (radius, angle) =
+                (random.random::<f64>().sqrt(), random.random::<f64>() * std::f64::consts::TAU);
             let (y, x) = angle.sin_cos();
             let (along, across) = (radius * x * ellipse.axes.x, radius * y * ellipse.axes.y);
             let noise = Vector2::from_fn(|_, _| StandardNormal.sample(random));

@@ -108,7 +108,9 @@ impl Generator {
                 Generator::Reject if !is_stable(&weights) => continue,
                 Generator::Reject => {}
                 Generator::L1 => weights.iter_mut().for_each(|weight| *weight *= STABLE / sum),
-                Generator::Smooth => weights.iter_mut().for_each(|weight| *weight = weight.abs() * STABLE / sum),
+                Generator::Smooth => {
+                    weights.iter_mut().for_each(|weight| *weight = weight.abs() * STABLE / sum)
+                }
             }
             return weights;
         }
@@ -124,7 +126,8 @@ fn is_stable(weights: &[f64]) -> bool {
         }
         let scale = 1.0 / (1.0 - reflection * reflection);
         let last = polynomial.len();
-        polynomial = (0..last).map(|i| (polynomial[i] - reflection * polynomial[last - 1 - i]) * scale).collect();
+        polynomial =
+            (0..last).map(|i| (polynomial[i] - reflection * polynomial[last - 1 - i]) * scale).collect();
     }
     true
 }

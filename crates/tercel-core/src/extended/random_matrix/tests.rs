@@ -28,7 +28,7 @@ fn every_rule_finds_position_velocity_and_extent() {
     let truth = Ellipse::new(vector![0.0, 0.0], vector![6.0, 1.25], 0.7).unwrap().matrix();
     for rule in RULES {
         let (filter, mut random) = (filter(rule), ChaCha8Rng::seed_from_u64(4));
-        let mut belief: Extended<4> =
+        let mut belief: GaussianInverseWishart<4> =
             filter.birth(&scan(vector![0.0, 0.0], &truth, 20, &mut random)).unwrap();
         for step in 1..=200 {
             filter.predict(&mut belief, 1.0);
@@ -48,7 +48,7 @@ fn the_likelihood_is_that_of_normal_points_when_the_extent_is_known() {
     let (spread, prior) =
         (extent * 0.25 + matrix![1.0, 0.0; 0.0, 0.64], InverseWishart::new(extent, 1e9).unwrap());
     let state = Gaussian::new(vector![1.0, 2.0], matrix![0.5, 0.1; 0.1, 0.3]).unwrap();
-    let belief = Extended { state, extent: prior, rate: None };
+    let belief = GaussianInverseWishart { state, extent: prior, rate: None };
     let filter = filter(Rule::Distorted);
     for count in [1, 2, 7, 60, 1000] {
         let points = scan(vector![0.5, 2.2], &extent, count, &mut ChaCha8Rng::seed_from_u64(5));
@@ -73,7 +73,7 @@ fn the_likelihood_integrates_over_the_extent() {
         Rule::Distorted,
     );
     let points = [[0.4, 1.0], [-2.0, 0.3], [1.0, -1.4], [0.2, 0.1]];
-    let start = Extended {
+    let start = GaussianInverseWishart {
         state: Gaussian { mean: vector![0.0, 0.0], covariance: Matrix2::identity() * 1e-14 },
         extent: filter.prior,
         rate: None,
@@ -100,7 +100,7 @@ fn every_scan_leaves_a_sound_belief() {
     let far = Points::from_iter([[1e7, -1e7], [1e7, 1e7]]);
     for rule in RULES {
         let filter = filter(rule);
-        let mut belief: Extended<4> = filter.birth(&Points::from_iter([[0.0, 0.0]])).unwrap();
+        let mut belief: GaussianInverseWishart<4> = filter.birth(&Points::from_iter([[0.0, 0.0]])).unwrap();
         for points in [&Points::default(), &coincident, &collinear, &many, &far, &coincident].repeat(20) {
             filter.predict(&mut belief, 1.0);
             filter.update(&mut belief, points).unwrap();
@@ -120,7 +120,7 @@ fn an_empty_scan_speaks_against_many_points_only_with_a_rate() {
     let rated = plain.with_rate(Rate::new(20.0, 5.0).unwrap(), 100.0).unwrap();
     let first = Points::from_iter([[0.0, 0.0], [1.0, 1.0]]);
     for (filter, tells) in [(plain, false), (rated, true)] {
-        let mut belief: Extended<4> = filter.birth(&first).unwrap();
+        let mut belief: GaussianInverseWishart<4> = filter.birth(&first).unwrap();
         filter.predict(&mut belief, 1.0);
         let innovation = filter.update(&mut belief, &Points::default()).unwrap();
         assert_eq!(innovation.log_likelihood < -5.0, tells);

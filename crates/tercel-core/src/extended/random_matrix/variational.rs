@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{Extended, RandomMatrix, centre, position_covariance};
+use super::{GaussianInverseWishart, RandomMatrix, centre, position_covariance};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::extended::symmetric::{congruent, inverse, symmetric};
@@ -25,7 +25,7 @@ use crate::filter::Comparison;
 /// every turn using the newest values. `G` in place of inverses of `R` allows a sensor without noise.
 pub(super) fn fixed_point<const N: usize, T>(
     filter: &RandomMatrix<T>,
-    belief: &Extended<N>,
+    belief: &GaussianInverseWishart<N>,
     points: &Points,
     sweeps: u32,
     tolerance: f64,

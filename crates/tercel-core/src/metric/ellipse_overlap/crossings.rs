@@ -15,6 +15,12 @@ pub(super) struct Crossings {
 /// Half the width of a chart in `t = tan(s/2)`: `tan(π/8)`.
 const EDGE: f64 = 0.414_213_562_373_095_03;
 
+/// Relative accuracy of turning points, which only have to part the roots.
+const COARSE: f64 = 1e-7;
+
+/// Relative accuracy of roots before they are polished.
+const FINE: f64 = 1e-9;
+
 /// The crossings of the ellipse with this centre and these semi-axes along `x` and `y`.
 ///
 /// Each quarter of the ellipse has a chart of its own, centred at a vertex: near a vertex of a needle `t` is small, and its digits are all
@@ -58,8 +64,12 @@ impl Crossings {
     }
 }
 
-/// The crossing after a step of Newton in the exact equation, which does not expand its squares.
+/// The crossing after two steps of Newton in the exact equation, which does not expand its squares.
 fn polished(s: f64, centre: &Vector2<f64>, axes: &Vector2<f64>) -> f64 {
+    stepped(stepped(s, centre, axes), centre, axes)
+}
+
+fn stepped(s: f64, centre: &Vector2<f64>, axes: &Vector2<f64>) -> f64 {
     let (sine, cosine) = s.sin_cos();
     let (x, y) = (centre.x + axes.x * cosine, centre.y + axes.y * sine);
     let slope = 2.0 * (y * axes.y * cosine - x * axes.x * sine);
@@ -85,12 +95,12 @@ impl Roots {
         let mut turning = Roots::default();
         let mut bends = Roots::default();
         bends.of_quadratic(&quadratic);
-        turning.between(&bends, &cubic);
-        self.between(&turning, c);
+        turning.between(&bends, &cubic, COARSE);
+        self.between(&turning, c, FINE);
     }
 
     /// The roots of a polynomial with those of its derivative.
-    fn between<const D: usize>(&mut self, turning: &Roots, c: &[f64; D]) {
+    fn between<const D: usize>(&mut self, turning: &Roots, c: &[f64; D], tolerance: f64) {
         let mut low = -EDGE;
         let mut at_low = value(c, low);
         for place in 0..=turning.count {
@@ -98,7 +108,7 @@ impl Roots {
             let at_high = value(c, high);
             // A root at the end of a piece belongs to the piece before it.
             if at_high == 0.0 || (at_low < 0.0) != (at_high < 0.0) && at_low != 0.0 {
-                self.push(bracketed(c, low, high, at_low));
+                self.push(bracketed(c, (low, high), at_low, tolerance));
             }
             (low, at_low) = (high, at_high);
         }
@@ -134,7 +144,12 @@ fn value<const D: usize>(c: &[f64; D], t: f64) -> f64 {
 }
 
 /// The root between two points of different sign, by Newton's steps that stay in the bracket.
-fn bracketed<const D: usize>(c: &[f64; D], mut low: f64, mut high: f64, at_low: f64) -> f64 {
+fn bracketed<const D: usize>(
+    c: &[f64; D],
+    (mut low, mut high): (f64, f64),
+    at_low: f64,
+    tolerance: f64,
+) -> f64 {
     let rising = at_low < 0.0;
     let mut t = 0.5 * (low + high);
     for _ in 0..60 {
@@ -150,7 +165,7 @@ fn bracketed<const D: usize>(c: &[f64; D], mut low: f64, mut high: f64, at_low: 
         }
         let newton = t - f / slope;
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - t).abs() <= 1e-15 + 1e-14 * t.abs() {
+        if (next - t).abs() <= tolerance * t.abs() + f64::EPSILON * EDGE {
             return next;
         }
         t = next;
