@@ -79,11 +79,12 @@ impl Scattering {
         extent * self.scale + self.noise
     }
 
-    /// The extent matrix (m²) whose points have this covariance. Where the noise explains more than there is, the extent is thin
-    /// but not empty.
+    /// The extent matrix (m²) whose points have this covariance. What is thinner than the sensor resolves is taken to be as thick as
+    /// its noise: semi-axes are not below the least deviation of the noise, or 1 % of the spread.
     pub fn extent(&self, spread: &Matrix2<f64>) -> Matrix2<f64> {
         let extent = (spread - self.noise) / self.scale;
-        let least = THINNEST * (spread.trace() / self.scale).max(f64::MIN_POSITIVE);
+        let resolved = super::symmetric::eigen(&self.noise).0.y;
+        let least = resolved.max(THINNEST * spread.trace() / self.scale).max(f64::MIN_POSITIVE);
         lifted(&extent, least)
     }
 

@@ -129,31 +129,73 @@ impl Settings {
         axes: VEHICLE,
         weight: 4.0,
         jump: 8.0,
-        kept: 0.003,
-        kept_direct: 0.003,
-        kept_variational: 0.003,
-        delta: 3.0,
+        kept: 0.02,
+        kept_direct: 0.02,
+        kept_variational: 0.001,
+        delta: 2.0,
         sweeps: 5,
-        imm: ImmSettings { stay: 0.8, jump: 8.0, jerk: 4.0, turn: 20.0 * DEGREE, kept: 0.003 },
-        mem_ekf: ShapeSettings { axes: 0.1, growth: 0.0, turning: 0.6 },
-        mem_rbpf: ShapeSettings { axes: 0.1, growth: 0.0, turning: 0.6 },
+        imm: ImmSettings { stay: 0.9, jump: 8.0, jerk: 1.0, turn: 3.0 * DEGREE, kept: 0.001 },
+        mem_ekf: ShapeSettings { axes: 0.03, growth: 0.0, turning: 1.0 },
+        mem_rbpf: ShapeSettings { axes: 0.03, growth: 0.0, turning: 2.0 },
         particles: 10,
-        jump_known: 4.0,
+        jump_known: 6.0,
         course: false,
-        jump_aligned: 3.0,
-        residual: 1.1,
+        jump_aligned: 5.0,
+        residual: 1.15,
         weights: 0.25,
         paper: VEHICLE_PAPER,
     };
 
     /// For vehicles with scaled weights of either sign.
-    pub const L1: Settings = Settings { ..Settings::REJECT };
+    pub const L1: Settings = Settings {
+        jump: 2.5,
+        kept: 0.05,
+        kept_direct: 0.05,
+        kept_variational: 0.003,
+        imm: ImmSettings { jump: 2.5, kept: 0.003, ..Settings::REJECT.imm },
+        jump_known: 1.6,
+        jump_aligned: 1.6,
+        residual: 1.0,
+        ..Settings::REJECT
+    };
 
     /// For vehicles whose velocity changes slowly.
-    pub const SMOOTH: Settings = Settings { ..Settings::REJECT };
+    pub const SMOOTH: Settings = Settings {
+        jump: 1.3,
+        kept: 0.09,
+        kept_direct: 0.12,
+        kept_variational: 0.009,
+        delta: 2.5,
+        imm: ImmSettings { jump: 1.3, kept: 0.009, ..Settings::REJECT.imm },
+        mem_ekf: ShapeSettings { turning: 0.6, ..Settings::REJECT.mem_ekf },
+        mem_rbpf: ShapeSettings { turning: 0.6, ..Settings::REJECT.mem_rbpf },
+        jump_known: 1.0,
+        jump_aligned: 1.3,
+        residual: 1.0,
+        ..Settings::REJECT
+    };
 
     /// For airliners.
-    pub const AIRCRAFT: Settings = Settings { axes: AIRLINER, paper: AIRCRAFT_PAPER, ..Settings::REJECT };
+    pub const AIRCRAFT: Settings = Settings {
+        axes: AIRLINER,
+        weight: 4.0,
+        jump: 14.0,
+        kept: 0.95,
+        kept_direct: 0.95,
+        kept_variational: 0.95,
+        delta: 300.0,
+        sweeps: 5,
+        imm: ImmSettings { stay: 0.9, jump: 13.0, jerk: 0.25, turn: DEGREE, kept: 0.97 },
+        mem_ekf: ShapeSettings { axes: 0.3, growth: 0.001, turning: 1e-4 },
+        mem_rbpf: ShapeSettings { axes: 0.1, growth: 0.0, turning: 0.01 },
+        particles: 50,
+        jump_known: 15.0,
+        course: true,
+        jump_aligned: 15.0,
+        residual: 8.5,
+        weights: 0.05,
+        paper: AIRCRAFT_PAPER,
+    };
 
     /// For objects of the same motion, whose sizes are those of cars and lorries.
     pub fn for_mixed_sizes(self) -> Settings {

@@ -32,9 +32,7 @@ pub(super) struct Mean(pub Settings);
 
 impl Method for Mean {
     fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
-        // The plain ellipse of the scatter: what noise is in it stays.
-        let scattering = Scattering::new(0.25, Matrix2::zeros())?;
-        let filter = Centroid::new(straight(self.0.jump), scattering, self.0.extent())?;
+        let filter = Centroid::new(straight(self.0.jump), sensor(recording)?, self.0.extent())?;
         let mut estimates = follow::<4, _>(recording, &filter)?;
         for estimate in &mut estimates {
             (estimate.mean.z, estimate.mean.w) = (f64::NAN, f64::NAN);
