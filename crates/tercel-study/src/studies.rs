@@ -7,6 +7,7 @@ use crate::air_traffic::{self, AirTrafficExperiment};
 use crate::autoferry;
 use crate::error::StudyError;
 use crate::extended::{self, ExtendedExperiment};
+use crate::extended_scene::{self, ExtendedSceneExperiment};
 use crate::monte_carlo::{Experiment, Plan};
 
 /// A study that can be run by its name.
@@ -107,7 +108,7 @@ fn boxed<E: Experiment + 'static>(
 }
 
 /// All studies.
-pub const STUDIES: [Study; 7] = [
+pub const STUDIES: [Study; 8] = [
     Study {
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
@@ -187,6 +188,19 @@ pub const STUDIES: [Study; 7] = [
             options: &[],
             data: true,
             build: |r| boxed(ExtendedExperiment::aircraft(r)),
+        }),
+    },
+    Study {
+        name: "extended-scene",
+        about: "three extended objects that cross among false points, in trackers of many objects",
+        methods: &extended_scene::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: extended_scene::SEED,
+            runs: 50,
+            sets: &[],
+            options: &[],
+            data: false,
+            build: |r| boxed(ExtendedSceneExperiment::new(r)),
         }),
     },
     Study {
@@ -386,7 +400,7 @@ mod tests {
 
     #[test]
     fn a_plan_gives_its_experiment_back() {
-        for name in ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "vehicle"] {
+        for name in ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "vehicle", "extended-scene"] {
             let choice = Choice { runs: Some(3), seed: Some(u64::MAX), ..Choice::default() };
             let plan = Study::find(name).unwrap().experiment(&choice).unwrap().plan().clone();
             assert_eq!(experiment_of(&plan).unwrap().plan(), &plan);

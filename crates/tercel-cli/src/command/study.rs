@@ -84,6 +84,7 @@ Studies:
   atc-missing  errors over the detection probability of the radar (--set test or hshm)
   vehicle      one vehicle seen as many points: motion and ellipse (--set backward or forward)
   aircraft     airliners on recorded tracks, seen as many points (--set course, smoothed or crab)
+  extended-scene  three extended objects that cross among false points
   autoferry    radar and lidar of a small ferry against the GNSS truth of two boats
 
 Examples:
