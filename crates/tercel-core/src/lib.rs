@@ -12,6 +12,7 @@
 //! | [`motion`] | how objects move over a time step |
 //! | [`sensor`] | what a sensor would measure |
 //! | [`filter`] | recursions for one object |
+//! | [`extended`] | objects that give many points: extents, and filters that estimate them |
 //! | [`association`] | gating and assignment of measurements |
 //! | [`multi`] | trackers for many objects in clutter |
 //! | [`metric`] | how good the tracks are |
@@ -24,6 +25,7 @@ pub mod belief;
 #[cfg(feature = "conformance")]
 pub mod conformance;
 pub mod error;
+pub mod extended;
 pub mod filter;
 pub mod geo;
 pub mod metric;

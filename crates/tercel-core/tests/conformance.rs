@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "conformance/extended.rs"]
+mod extended;
 #[path = "conformance/polar.rs"]
 mod polar;
 #[path = "conformance/regimes.rs"]
@@ -127,6 +129,21 @@ conformance!(
         RaoBlackwellised::new(regimes::turns(p), p.sensor(), 5, 1).unwrap()
     })
 );
+
+conformance!(random_matrix_direct, extended::exact(|p| extended::matrix(p, extended::Kind::Direct)));
+conformance!(random_matrix_distorted, extended::exact(|p| extended::matrix(p, extended::Kind::Distorted)));
+conformance!(
+    random_matrix_variational,
+    extended::exact(|p| extended::matrix(p, extended::Kind::Variational))
+);
+conformance!(imm_of_random_matrices, extended::exact(extended::interacting));
+conformance!(random_matrix_of_unknown_shape, extended::own::<4, _, _>(extended::unknown));
+conformance!(mem_ekf, extended::exact(extended::linearised));
+conformance!(mem_rbpf, extended::exact(extended::sampled));
+conformance!(known_size, extended::exact(extended::known));
+conformance!(aligned, extended::exact(extended::aligned));
+conformance!(aligned_auto_regressive, extended::own::<8, _, _>(extended::regressive));
+conformance!(centroid, extended::own::<4, _, _>(extended::centroid));
 
 #[test]
 fn the_bounds_of_the_suite_are_those_of_the_chi_square_distribution() {

@@ -30,6 +30,7 @@ pub mod import;
 mod layout;
 mod metadata;
 pub mod ndjson;
+mod npy;
 mod options;
 mod output;
 mod read;
@@ -42,6 +43,7 @@ pub use error::{DataError, Place, Spot};
 pub use format::Format;
 pub use import::{ImportOptions, Imported, LeftOut, Source, import};
 pub use metadata::SCHEMA_VERSION;
+pub use npy::{Array, read_npy};
 pub use options::ReadOptions;
 pub use output::AtomicFile;
 pub use read::{

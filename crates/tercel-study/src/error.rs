@@ -54,6 +54,14 @@ pub enum StudyError {
         /// What was looked for.
         expected: &'static str,
     },
+    /// A file or folder does not hold the recorded tracks that a study needs.
+    #[error("{}: {problem}", path.display())]
+    Tracks {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// A recording has no truth to score against.
     #[error("recording {recording} has no truth beside it; expected a file {recording}_groundTruth.json")]
     NoTruth {

@@ -7,6 +7,8 @@
 //! | [`studies`] | the studies by name |
 //! | [`monte_carlo`] | carries out studies whose scenes are drawn, on all cores or several machines |
 //! | [`air_traffic`] | the studies of one manoeuvring aircraft |
+//! | [`extended`] | the studies of one object that is seen as many points |
+//! | [`extended_scene`] | the study of several such objects that cross |
 //! | [`autoferry`] | the study on real radar and lidar |
 //! | [`tune`] | fits the numbers of a configuration to recordings |
 
@@ -14,6 +16,8 @@ pub mod air_traffic;
 pub mod autoferry;
 mod error;
 pub mod evaluate;
+pub mod extended;
+pub mod extended_scene;
 pub mod monte_carlo;
 pub mod report;
 pub mod studies;

@@ -1,8 +1,13 @@
 //! The studies by name.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
 use crate::air_traffic::{self, AirTrafficExperiment};
 use crate::autoferry;
 use crate::error::StudyError;
+use crate::extended::{self, ExtendedExperiment};
+use crate::extended_scene::{self, ExtendedSceneExperiment};
 use crate::monte_carlo::{Experiment, Plan};
 
 /// A study that can be run by its name.
@@ -45,7 +50,20 @@ pub struct MonteCarlo {
     pub runs: u64,
     /// The sets of scenes among which can be chosen, the default first; none when there is nothing to choose.
     pub sets: &'static [&'static str],
+    /// What else can be chosen.
+    pub options: &'static [Selection],
+    /// Whether its scenes are drawn around recorded data, which must be named.
+    pub data: bool,
     build: fn(&Request<'_>) -> Result<Box<dyn Experiment>, StudyError>,
+}
+
+/// Something of which a study has several kinds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Selection {
+    /// Its name, as that of an option.
+    pub name: &'static str,
+    /// The kinds, the default first.
+    pub values: &'static [&'static str],
 }
 
 /// What may be chosen about a study whose scenes are drawn; what is not chosen is as the study has it.
@@ -59,14 +77,21 @@ pub struct Choice {
     pub methods: Option<Vec<String>>,
     /// Name of a set of scenes.
     pub set: Option<String>,
+    /// Of what a study has several kinds, by name.
+    pub options: BTreeMap<String, String>,
+    /// File or folder of the data around which scenes are drawn.
+    pub data: Option<PathBuf>,
 }
 
 /// A choice that was made.
-struct Request<'a> {
-    set: &'a str,
-    seed: u64,
-    runs: u64,
-    methods: &'a [String],
+pub(crate) struct Request<'a> {
+    pub set: &'a str,
+    pub seed: u64,
+    pub runs: u64,
+    pub methods: &'a [String],
+    /// The kinds of everything of which there are several.
+    pub options: BTreeMap<String, String>,
+    pub data: Option<&'a Path>,
 }
 
 impl Request<'_> {
@@ -83,7 +108,7 @@ fn boxed<E: Experiment + 'static>(
 }
 
 /// All studies.
-pub const STUDIES: [Study; 6] = [
+pub const STUDIES: [Study; 9] = [
     Study {
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
@@ -92,6 +117,8 @@ pub const STUDIES: [Study; 6] = [
             seed: air_traffic::SEED,
             runs: 1000,
             sets: &[],
+            options: &[],
+            data: false,
             build: |r| boxed(AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods)),
         }),
     },
@@ -103,6 +130,8 @@ pub const STUDIES: [Study; 6] = [
             seed: air_traffic::SEED,
             runs: 1000,
             sets: &[],
+            options: &[],
+            data: false,
             build: |r| boxed(AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods)),
         }),
     },
@@ -114,6 +143,8 @@ pub const STUDIES: [Study; 6] = [
             seed: air_traffic::SEED,
             runs: 200,
             sets: &["test", "hshm"],
+            options: &[],
+            data: false,
             build: |r| boxed(AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods)),
         }),
     },
@@ -125,6 +156,8 @@ pub const STUDIES: [Study; 6] = [
             seed: air_traffic::SEED,
             runs: 200,
             sets: &["test", "hshm"],
+            options: &[],
+            data: false,
             build: |r| boxed(AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods)),
         }),
     },
@@ -136,7 +169,51 @@ pub const STUDIES: [Study; 6] = [
             seed: air_traffic::SEED,
             runs: 1000,
             sets: &[],
+            options: &[],
+            data: false,
             build: |r| boxed(AirTrafficExperiment::ablation(r.seed, r.runs, r.methods)),
+        }),
+    },
+    Study {
+        name: "vehicle",
+        about: "one vehicle seen as many points: motion and ellipse (RMMNet paper, Table I)",
+        methods: &extended::methods::VEHICLE_METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: extended::SEED,
+            runs: 40,
+            sets: &["backward", "forward"],
+            options: &[
+                Selection { name: "generator", values: &["reject", "l1", "smooth"] },
+                Selection { name: "sizes", values: &["fixed", "random"] },
+            ],
+            data: false,
+            build: |r| boxed(ExtendedExperiment::vehicle(r)),
+        }),
+    },
+    Study {
+        name: "aircraft",
+        about: "airliners on recorded tracks, seen as many points (RMMNet paper, Table II)",
+        methods: extended::methods::AIRCRAFT_METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: extended::SEED,
+            runs: 52,
+            sets: &["course", "smoothed", "crab"],
+            options: &[],
+            data: true,
+            build: |r| boxed(ExtendedExperiment::aircraft(r)),
+        }),
+    },
+    Study {
+        name: "extended-scene",
+        about: "three extended objects that cross among false points, in trackers of many objects",
+        methods: &extended_scene::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: extended_scene::SEED,
+            runs: 50,
+            sets: &[],
+            options: &[],
+            data: false,
+            build: |r| boxed(ExtendedSceneExperiment::new(r)),
         }),
     },
     Study {
@@ -204,9 +281,51 @@ impl Study {
         if !(1..=1 << 32).contains(&runs) {
             return refused(format!("a study cannot have {runs} runs; expected 1 to {}", 1_u64 << 32));
         }
+        let options = self.options(study, &choice.options)?;
+        let data = choice.data.as_deref();
+        if study.data != data.is_some() {
+            return Err(self.wrong_data(study.data));
+        }
         let seed = choice.seed.unwrap_or(study.seed);
-        let request = Request { set, seed, runs, methods: &methods };
+        let request = Request { set, seed, runs, methods: &methods, options, data };
         (study.build)(&request)
+    }
+}
+
+impl Study {
+    /// What was chosen of everything of which the study has several kinds.
+    fn options(
+        &self,
+        study: &MonteCarlo,
+        chosen: &BTreeMap<String, String>,
+    ) -> Result<BTreeMap<String, String>, StudyError> {
+        if let Some(name) =
+            chosen.keys().find(|name| study.options.iter().all(|option| option.name != **name))
+        {
+            return Err(StudyError::Option(format!("the study {} takes no --{name}", self.name)));
+        }
+        let choose = |option: &Selection| {
+            let value = chosen.get(option.name).map_or(option.values[0], String::as_str);
+            if option.values.contains(&value) {
+                return Ok((option.name.to_owned(), value.to_owned()));
+            }
+            let (study, name, known) = (self.name, option.name, listed(value, option.values));
+            Err(StudyError::Option(format!(
+                "the study {study} has no {name} `{value}`; expected one of: {known}"
+            )))
+        };
+        study.options.iter().map(choose).collect()
+    }
+
+    fn wrong_data(&self, needed: bool) -> StudyError {
+        let name = self.name;
+        StudyError::Option(if needed {
+            format!(
+                "the study {name} draws its scenes around recorded tracks\n  help: say where they are with --data PATH"
+            )
+        } else {
+            format!("the study {name} draws its scenes and takes no --data")
+        })
     }
 }
 
@@ -220,6 +339,13 @@ pub fn experiment_of(plan: &Plan) -> Result<Box<dyn Experiment>, StudyError> {
         runs: Some(plan.runs),
         methods: Some(plan.methods.clone()),
         set: plan.options.get("set").cloned(),
+        options: plan
+            .options
+            .iter()
+            .filter(|(name, _)| !["set", "data"].contains(&name.as_str()))
+            .map(|(name, value)| (name.clone(), value.clone()))
+            .collect(),
+        data: plan.options.get("data").map(PathBuf::from),
     };
     let experiment = Study::find(&plan.study)?.experiment(&choice)?;
     if experiment.plan() == plan {
@@ -287,7 +413,9 @@ mod tests {
 
     #[test]
     fn a_plan_gives_its_experiment_back() {
-        for name in ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "atc-ablation"] {
+        for name in
+            ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "atc-ablation", "vehicle", "extended-scene"]
+        {
             let choice = Choice { runs: Some(3), seed: Some(u64::MAX), ..Choice::default() };
             let plan = Study::find(name).unwrap().experiment(&choice).unwrap().plan().clone();
             assert_eq!(experiment_of(&plan).unwrap().plan(), &plan);

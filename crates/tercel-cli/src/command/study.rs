@@ -48,6 +48,12 @@ pub struct StudyArguments {
     /// Set of scenes, for a study that has several.
     #[arg(long, value_name = "SET")]
     set: Option<String>,
+    /// How the motion of vehicles is drawn: reject, l1 or smooth.
+    #[arg(long, value_name = "KIND")]
+    generator: Option<String>,
+    /// Sizes of vehicles: fixed or random.
+    #[arg(long, value_name = "KIND")]
+    sizes: Option<String>,
     /// Compute a share of the runs, 1/4 to 4/4, into a file in the folder of -o.
     #[arg(long, value_name = "I/N", requires = "output")]
     shard: Option<Shard>,
@@ -57,8 +63,8 @@ pub struct StudyArguments {
     /// Threads to use; without it, one for each core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Folder with the recordings of a study on real data.
-    #[arg(long, value_name = "DIR")]
+    /// Folder with the recordings of a study on real data, or a file of recorded tracks.
+    #[arg(long, value_name = "PATH")]
     data: Option<PathBuf>,
     /// Folder for the table, the numbers of every run and the report.
     #[arg(long, short, value_name = "DIR")]
@@ -82,6 +88,9 @@ Studies:
   atc-hshm     the same at high speed with hard turns
   atc-noise    errors over the bearing noise of the radar (--set test or hshm)
   atc-missing  errors over the detection probability of the radar (--set test or hshm)
+  vehicle      one vehicle seen as many points: motion and ellipse (--set backward or forward)
+  aircraft     airliners on recorded tracks, seen as many points (--set course, smoothed or crab)
+  extended-scene  three extended objects that cross among false points
   autoferry    radar and lidar of a small ferry against the GNSS truth of two boats
 
 Examples:
@@ -89,6 +98,8 @@ Examples:
   tercel study atc-noise --set hshm -o results
   tercel study atc-test --shard 1/2 -o shards && tercel study atc-test --shard 2/2 -o shards
   tercel study merge shards -o results
+  tercel study vehicle --generator smooth --sizes random --runs 10
+  tercel study aircraft --data tracks.npy
   tercel study autoferry --data data/autoferry --json -o results";
 
 const LIST_AFTER: &str = "\
@@ -114,15 +125,19 @@ impl StudyArguments {
     }
 
     fn run_drawn(&self, study: &Study, console: &Console) -> Result<(), Failure> {
-        if self.data.is_some() {
-            let message = format!("the study {} draws its scenes and takes no --data", study.name);
-            return Err(Failure::usage(message));
-        }
         if self.shard.is_some() && self.json {
             return Err(Failure::usage("--json prints a table, and a shard has none before it is merged"));
         }
-        let choice =
-            Choice { seed: self.seed, runs: self.runs, methods: self.methods.clone(), set: self.set.clone() };
+        let options = [("generator", &self.generator), ("sizes", &self.sizes)];
+        let given = |(name, value): (&str, &Option<String>)| Some((name.to_owned(), value.clone()?));
+        let choice = Choice {
+            seed: self.seed,
+            runs: self.runs,
+            methods: self.methods.clone(),
+            set: self.set.clone(),
+            options: options.into_iter().filter_map(given).collect(),
+            data: self.data.clone(),
+        };
         let experiment = study.experiment(&choice)?;
         match (self.shard, &self.output) {
             (Some(shard), Some(folder)) => self.run_shard(&*experiment, shard, folder, console),
@@ -184,6 +199,8 @@ impl StudyArguments {
             ("--runs", self.runs.is_some()),
             ("--seed", self.seed.is_some()),
             ("--set", self.set.is_some()),
+            ("--generator", self.generator.is_some()),
+            ("--sizes", self.sizes.is_some()),
             ("--shard", self.shard.is_some()),
             ("--threads", self.threads.is_some()),
         ];

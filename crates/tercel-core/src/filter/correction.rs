@@ -9,7 +9,7 @@ use crate::motion::Motion;
 use crate::sensor::{Measurement, Reading, Sensor};
 
 /// A measurement compared with a Gaussian belief through a linearised sensor.
-pub(super) struct Comparison<const N: usize, const M: usize> {
+pub(crate) struct Comparison<const N: usize, const M: usize> {
     residual: SVector<f64, M>,
     noise: SMatrix<f64, M, M>,
     jacobian: SMatrix<f64, M, N>,
@@ -88,7 +88,7 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
 
 /// The belief after `dt` by a motion, to first order.
 #[inline(always)]
-pub(super) fn predicted<const N: usize>(
+pub(crate) fn predicted<const N: usize>(
     motion: &impl Motion<N>,
     belief: &Gaussian<N>,
     dt: f64,

@@ -10,6 +10,7 @@ use super::transition::Chain;
 use super::{Estimate, Filter, Innovation, Transition};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
+use crate::extended::InverseWishart;
 use mixing::Origin;
 
 /// Estimates a state whose motion changes between models, with one filter per model and their probabilities.
@@ -24,7 +25,7 @@ use mixing::Origin;
 /// mean of those of the modes under `c`, and the normalised square their mean under the new `μ`.
 ///
 /// Any filter can be a mode: a learned one keeps its memory, because mixing replaces only mean and covariance
-/// ([`set_state`](Filter::set_state)). Filters of different types go in boxes, and a model with a smaller state in
+/// ([`set_state`](Filter::set_state)). Extents of random-matrix filters are mixed to their moments, too. Filters of different types go in boxes, and a model with a smaller state in
 /// [`Padded`](super::Padded).
 ///
 /// A mode whose update fails keeps its belief, gets a vanishing probability and restarts from the others at the next mixing;
@@ -168,13 +169,17 @@ impl<F> Imm<F> {
         let ImmBelief { modes, probabilities, transition, origins } = belief;
         origins.clear();
         let states = modes.iter().zip(&self.filters).zip(&*probabilities);
-        origins
-            .extend(states.map(|((mode, filter), weight)| Origin::new(*weight, filter.state(&mode.belief))));
+        origins.extend(states.map(|((mode, filter), weight)| {
+            Origin::new(*weight, filter.state(&mode.belief), filter.extent(&mode.belief))
+        }));
         self.chain.leap(dt, transition, |leap| mixing::mix(origins, &leap));
         for ((mode, filter), origin) in modes.iter_mut().zip(&self.filters).zip(&*origins) {
             // Without anything from other modes, mixing would only round.
             if origin.mixed {
                 filter.set_state(&mut mode.belief, &origin.state);
+                if let Some(extent) = &origin.extent {
+                    filter.set_extent(&mut mode.belief, extent);
+                }
             }
         }
         for (probability, origin) in probabilities.iter_mut().zip(origins) {
@@ -289,7 +294,25 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
 
     fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
         let state = self.state(belief);
-        Estimate { mean: state.mean, covariance: state.covariance, modes: belief.probabilities.clone() }
+        let parts = || belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
+        let total: f64 = belief.probabilities.iter().sum();
+        let share = |((mode, filter), probability): ((&Mode<_, N>, &F), &f64)| {
+            Some(filter.estimate(&mode.belief).extent? * (probability / total))
+        };
+        let extent = parts().map(share).sum::<Option<_>>().filter(|_| !self.filters.is_empty());
+        Estimate { modes: belief.probabilities.clone(), extent, ..state.into() }
+    }
+
+    fn extent(&self, belief: &Self::Belief) -> Option<InverseWishart> {
+        let modes = belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
+        blended(modes.map(|((mode, filter), probability)| (*probability, filter.extent(&mode.belief))))
+    }
+
+    /// Every mode gets this extent.
+    fn set_extent(&self, belief: &mut Self::Belief, extent: &InverseWishart) {
+        for (mode, filter) in belief.modes.iter_mut().zip(&self.filters) {
+            filter.set_extent(&mut mode.belief, extent);
+        }
     }
 
     fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
@@ -315,6 +338,25 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
     fn area(&self, measurement: &F::Measurement) -> f64 {
         self.filters.first().map_or(1.0, |filter| filter.area(measurement))
     }
+
+    fn ln_clutter(&self, measurement: &F::Measurement, intensity: f64) -> f64 {
+        self.filters.first().map_or(0.0, |filter| filter.ln_clutter(measurement, intensity))
+    }
+}
+
+/// The extent with the moments of a mixture; none unless every part has one.
+fn blended(parts: impl Iterator<Item = (f64, Option<InverseWishart>)>) -> Option<InverseWishart> {
+    let mut merged: Option<InverseWishart> = None;
+    let mut total = 0.0;
+    for (weight, extent) in parts {
+        let extent = extent?;
+        match &mut merged {
+            Some(merged) => merged.merge(total, &extent, weight),
+            None => merged = Some(extent),
+        }
+        total += weight;
+    }
+    merged
 }
 
 /// The error of a step in which no mode could be updated.

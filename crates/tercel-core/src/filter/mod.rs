@@ -30,7 +30,9 @@ use nalgebra::{SMatrix, Vector2};
 
 use crate::belief::Gaussian;
 use crate::error::FilterError;
+use crate::extended::InverseWishart;
 
+pub(crate) use correction::{Comparison, predicted};
 pub use estimate::Estimate;
 pub use extended::Extended;
 pub use imm::{Imm, ImmBelief};
@@ -39,6 +41,7 @@ pub use kalman::Kalman;
 pub use padded::Padded;
 pub use particle::{Particle, Particles};
 pub use rao_blackwell::{Hypotheses, Hypothesis, RandomTurns, RaoBlackwellised, Regime, Turning};
+pub(crate) use sampling::{resample, seed_of};
 pub use sigma::SigmaPoints;
 pub use transition::Transition;
 pub use turn_bank::TurnBank;
@@ -120,6 +123,15 @@ pub trait Filter<const N: usize> {
         self.state(belief).mahalanobis_within(&self.state(other).mean, limit)
     }
 
+    /// The belief about the extent, in filters that have one in this form. Together with
+    /// [`set_extent`](Filter::set_extent) it lets an interacting multiple model filter mix the extents of its modes.
+    fn extent(&self, _belief: &Self::Belief) -> Option<InverseWishart> {
+        None
+    }
+
+    /// Replaces the belief about the extent and leaves the rest as it is. Filters without one ignore it.
+    fn set_extent(&self, _belief: &mut Self::Belief, _extent: &InverseWishart) {}
+
     /// What a user wants to know of the object.
     fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
         self.state(belief).into()
@@ -135,6 +147,12 @@ pub trait Filter<const N: usize> {
     /// Area of the plane (m²) per unit volume of the measurement space, which turns a clutter intensity per m² into one
     /// that compares with the likelihoods of this filter.
     fn area(&self, measurement: &Self::Measurement) -> f64;
+
+    /// Logarithm of the density of clutter that looks like this measurement, where the plane holds `intensity` false points per
+    /// m²: what [`Innovation::log_likelihood`] is weighed against.
+    fn ln_clutter(&self, measurement: &Self::Measurement, intensity: f64) -> f64 {
+        (intensity * self.area(measurement)).ln()
+    }
 
     /// Moves many beliefs forward. Filters that work faster on batches override it.
     fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
@@ -182,6 +200,12 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
     fn distance(&self, belief: &Self::Belief, other: &Self::Belief, limit: f64) -> f64 {
         (**self).distance(belief, other, limit)
     }
+    fn extent(&self, belief: &Self::Belief) -> Option<InverseWishart> {
+        (**self).extent(belief)
+    }
+    fn set_extent(&self, belief: &mut Self::Belief, extent: &InverseWishart) {
+        (**self).set_extent(belief, extent);
+    }
     fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
         (**self).estimate(belief)
     }
@@ -193,6 +217,9 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
     }
     fn area(&self, measurement: &Self::Measurement) -> f64 {
         (**self).area(measurement)
+    }
+    fn ln_clutter(&self, measurement: &Self::Measurement, intensity: f64) -> f64 {
+        (**self).ln_clutter(measurement, intensity)
     }
     fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
         (**self).predict_all(beliefs, dt);

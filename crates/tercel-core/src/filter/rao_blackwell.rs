@@ -228,7 +228,7 @@ where
     fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
         let Gaussian { mean, covariance } = belief.moments();
         let modes = if self.regime.modes() > 1 { self.mode_probabilities(belief) } else { Vec::new() };
-        Estimate { mean, covariance, modes }
+        Estimate { mean, covariance, modes, extent: None }
     }
 
     fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {

@@ -10,7 +10,7 @@ pub(super) fn effective(ln_weights: &[f64]) -> f64 {
 
 /// Fills `chosen` with `count` copies from a weighted list, each item about as often as its weight says: systematic
 /// resampling of Kitagawa (1996), appendix. The weights add up to one, and `offset`, between 0 and 1, is the random part.
-pub(super) fn resample<'a, T: Clone + 'a>(
+pub(crate) fn resample<'a, T: Clone + 'a>(
     weighted: impl Iterator<Item = (f64, &'a T)>,
     offset: f64,
     count: usize,
@@ -38,7 +38,7 @@ pub(super) fn resample<'a, T: Clone + 'a>(
 }
 
 /// A seed that differs with every measurement: FNV-1a over the bytes of the filter's seed and the measured values.
-pub(super) fn seed_of<const M: usize>(seed: u64, measurement: &Measurement<M>) -> u64 {
+pub(crate) fn seed_of<const M: usize>(seed: u64, measurement: &Measurement<M>) -> u64 {
     let values = measurement.value.iter().map(|value| value.to_bits());
     std::iter::once(seed)
         .chain(values)

@@ -7,6 +7,8 @@
 //! | [`Ospa2`] | two sets of trajectories, over a window | distance per trajectory |
 //! | [`TrajectoryGospa`] | two sets of trajectories | GOSPA over time, with a part for track switches |
 //! | [`Rmse`] | one estimated state with the true one | root mean square errors, per element and Euclidean |
+//! | [`intersection_over_union`] | an estimated extent with the true one | the share of the area that both cover |
+//! | [`wasserstein`] | the same | squared distance, split into position and shape |
 //! | [`Consistency`] | errors with what the filter believes of them | NEES and NIS, their chi-square bounds, coverage |
 //!
 //! The set metrics are true metrics: zero for equal sets only, symmetric, and with the triangle inequality. Every one of
@@ -17,6 +19,7 @@
 //! sum. Averages over steps and runs are taken by accumulators that can be merged, so that runs may be scored apart.
 
 mod consistency;
+mod ellipse_overlap;
 mod gospa;
 mod ospa;
 mod ospa2;
@@ -26,11 +29,14 @@ mod scale;
 mod tests;
 mod trajectory;
 mod trajectory_gospa;
+mod wasserstein;
 
 pub use consistency::{Consistency, chi_square_quantile, nees};
+pub use ellipse_overlap::intersection_over_union;
 pub use gospa::{Gospa, GospaAverage, GospaParts, GospaScore};
 pub use ospa::{Ospa, OspaParts, OspaScore};
 pub use ospa2::Ospa2;
 pub use rmse::Rmse;
 pub use trajectory::Trajectory;
 pub use trajectory_gospa::{TrajectoryGospa, TrajectoryGospaParts, TrajectoryGospaScore};
+pub use wasserstein::{Wasserstein, wasserstein};

@@ -7,13 +7,17 @@
 //! | [`ConstantAcceleration`] | positions, velocities, accelerations | with a steady acceleration |
 //! | [`Singer`] | positions, velocities, accelerations | with an acceleration that fades |
 //! | [`Turn`] | `x, y, vx, vy` | on a circle, at a known rate |
+//! | [`AutoRegressive`] | `x, y`, velocities of the last steps | with a velocity that depends on those before |
+//! | [`PaddedMotion`] | that of a larger model | as a model with a smaller state |
 //! | [`CoordinatedTurn`] | `x, y, vx, vy, turn rate` | on a circle, at a rate that is estimated |
 //!
 //! The first four work in any number of dimensions: one per axis, two in the plane, three in space.
 
+mod auto_regressive;
 mod constant_acceleration;
 mod constant_velocity;
 mod coordinated_turn;
+mod padded;
 mod random_walk;
 mod singer;
 mod turn;
@@ -22,9 +26,12 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::belief::Gaussian;
 
+pub(crate) use auto_regressive::AutoRegression;
+pub use auto_regressive::{AutoRegressive, Kinematics};
 pub use constant_acceleration::ConstantAcceleration;
 pub use constant_velocity::ConstantVelocity;
 pub use coordinated_turn::CoordinatedTurn;
+pub use padded::PaddedMotion;
 pub use random_walk::RandomWalk;
 pub use singer::Singer;
 pub use turn::Turn;
@@ -93,6 +100,10 @@ pub enum AccelerationNoise {
     /// An acceleration with this standard deviation, in m/s² per axis, that is constant within each step and drawn
     /// anew for the next. The covariance has rank one per axis, and depends on how time is cut into steps.
     Piecewise(f64),
+    /// A jump of the velocity with this standard deviation, in m/s per axis, at the beginning of each step: the position moves
+    /// with the new velocity, as in data whose velocities are differences backwards in time. The covariance has rank one per
+    /// axis, and depends on how time is cut into steps.
+    Jump(f64),
 }
 
 impl AccelerationNoise {
@@ -107,6 +118,11 @@ impl AccelerationNoise {
             AccelerationNoise::Piecewise(deviation) => {
                 let (p, v) = (0.5 * deviation * dt * dt, deviation * dt);
                 (p * p, p * v, v * v)
+            }
+            AccelerationNoise::Jump(_) if dt == 0.0 => (0.0, 0.0, 0.0),
+            AccelerationNoise::Jump(deviation) => {
+                let variance = deviation * deviation;
+                (variance * dt * dt, variance * dt, variance)
             }
         }
     }

@@ -86,14 +86,22 @@ fn places<const N: usize, F: Filter<N> + ?Sized>(
     Ok(places)
 }
 
-/// Clutter intensity at a measurement, in the units of the filter's likelihoods.
-fn clutter_at<const N: usize, F: Filter<N> + ?Sized>(
+/// Logarithm of the clutter intensity at a measurement, in the units of the filter's likelihoods.
+fn ln_clutter_at<const N: usize, F: Filter<N> + ?Sized>(
     filter: &F,
     scan: &Scan<'_, F::Measurement>,
     measurement: &F::Measurement,
 ) -> f64 {
-    scan.clutter.intensity(filter.place(measurement).as_ref()) * filter.area(measurement)
+    filter.ln_clutter(measurement, scan.clutter.intensity(filter.place(measurement).as_ref()))
 }
+
+/// A ratio of densities from its logarithm. One beyond the range of a double leaves no doubt, and can still be added up.
+fn ratio(ln_ratio: f64) -> f64 {
+    if ln_ratio > LARGEST_RATIO { LARGEST_RATIO.exp() } else { ln_ratio.exp() }
+}
+
+/// Logarithm of the largest ratio.
+const LARGEST_RATIO: f64 = 600.0;
 
 /// Expected number of new objects behind an unexplained measurement, given the number where clutter has its background
 /// intensity: where the clutter map is dense an unexplained measurement is more clutter and as little new object as anywhere.

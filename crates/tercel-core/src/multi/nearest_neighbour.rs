@@ -5,8 +5,8 @@ use crate::error::FilterError;
 use crate::filter::Filter;
 
 use super::{
-    Management, Scan, Status, Track, TrackId, Tracker, TrackerError, Use, birth_weight, clutter_at, error,
-    places, plane,
+    Management, Scan, Status, Track, TrackId, Tracker, TrackerError, Use, birth_weight, error, ln_clutter_at,
+    places, plane, ratio,
 };
 
 /// Gives each track at most one measurement and each measurement to at most one track, so that the whole scan is explained
@@ -160,8 +160,8 @@ impl<B: Clone> NearestNeighbour<B> {
                 let Ok(innovation) = filter.innovation(&track.belief, &scan.measurements[column]) else {
                     continue;
                 };
-                let clutter = clutter_at(filter, scan, &scan.measurements[column]);
-                let cost = -(track.existence * seen).ln() - innovation.log_likelihood + clutter.ln();
+                let clutter = ln_clutter_at(filter, scan, &scan.measurements[column]);
+                let cost = -(track.existence * seen).ln() - innovation.log_likelihood + clutter;
                 if self.config.gate.contains(&innovation) && cost.is_finite() {
                     pairs.push((row, column, cost));
                 }
@@ -188,13 +188,13 @@ impl<B: Clone> NearestNeighbour<B> {
             let paired = number.and_then(|number| {
                 let measurement = &scan.measurements[number];
                 let innovation = filter.update(&mut track.belief, measurement).ok()?;
-                Some((number, innovation.log_likelihood.exp() / clutter_at(filter, scan, measurement)))
+                let ln_ratio = innovation.log_likelihood - ln_clutter_at(filter, scan, measurement);
+                Some((number, ratio(ln_ratio)))
             });
             match paired {
                 Some((number, ratio)) => {
                     let l = 1.0 - seen + seen * ratio;
-                    // A ratio beyond the range of a double leaves no doubt.
-                    track.existence = if l.is_finite() { r * l / (1.0 - r + r * l) } else { 1.0 };
+                    track.existence = r * l / (1.0 - r + r * l);
                     track.hit(number, scan.time);
                     self.uses[number] = Use::Updated(track.id);
                 }

@@ -5,8 +5,8 @@ use crate::error::FilterError;
 use crate::filter::Filter;
 
 use super::{
-    Management, Scan, Status, Track, TrackId, Tracker, TrackerError, Use, birth_weight, clutter_at, error,
-    places, plane,
+    Management, Scan, Status, Track, TrackId, Tracker, TrackerError, Use, birth_weight, error, ln_clutter_at,
+    places, plane, ratio,
 };
 
 /// Estimates the intensity of objects over the state space, as a mixture of beliefs, without deciding which measurement
@@ -126,7 +126,7 @@ struct Scratch<B> {
     index: PlaceIndex,
     near: Vec<usize>,
     children: Vec<Component<B>>,
-    /// Sum of the detection terms of each measurement, then its whole denominator.
+    /// Sum of the detection terms of each measurement, then its whole denominator, relative to its clutter.
     explained: Vec<f64>,
     taken: Vec<bool>,
 }
@@ -210,16 +210,17 @@ impl<B: Clone> Phd<B> {
                 if !self.config.gate.contains(&innovation) {
                     continue;
                 }
-                let weight = detection * component.weight * innovation.log_likelihood.exp();
+                let ln_ratio =
+                    innovation.log_likelihood - ln_clutter_at(filter, scan, &scan.measurements[number]);
+                let weight = detection * component.weight * ratio(ln_ratio);
                 explained[number] += weight;
                 let (label, measurement) = (component.label, Some(number));
                 children.push(Component { weight, label, belief, measurement, in_view: true });
             }
             component.weight *= 1.0 - detection;
         }
-        for (number, measurement) in scan.measurements.iter().enumerate() {
-            explained[number] += clutter_at(filter, scan, measurement);
-        }
+        // Everything is relative to the clutter at the measurement, whose own share is then one.
+        explained.iter_mut().for_each(|sum| *sum += 1.0);
         self.components.append(children);
         for component in &mut self.components {
             if let Some(number) = component.measurement {
@@ -322,8 +323,7 @@ impl<B: Clone> Phd<B> {
             }
         }
         for (number, measurement) in scan.measurements.iter().enumerate() {
-            let intensity = clutter_at(filter, scan, measurement);
-            let unexplained = intensity / self.scratch.explained[number];
+            let unexplained = 1.0 / self.scratch.explained[number];
             let weight = birth_weight(self.config.birth, filter, scan, measurement) * unexplained;
             if weight <= self.config.prune || unexplained < 0.1 {
                 continue;

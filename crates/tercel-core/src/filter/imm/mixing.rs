@@ -1,7 +1,8 @@
 //! Where each mode starts from, when modes may have changed.
 
-use super::{moments, settle};
+use super::{blended, moments, settle};
 use crate::belief::Gaussian;
+use crate::extended::InverseWishart;
 use crate::filter::transition::Leap;
 
 /// Where a mode starts from: the moments of all modes that may have led to it, and their probability.
@@ -9,16 +10,18 @@ use crate::filter::transition::Leap;
 pub(super) struct Origin<const N: usize> {
     pub weight: f64,
     pub state: Gaussian<N>,
+    /// In filters that have one.
+    pub extent: Option<InverseWishart>,
     /// Whether anything of other modes is in it.
     pub mixed: bool,
-    /// Probability and state before the link that is being followed.
-    before: (f64, Gaussian<N>),
+    /// Probability, state and extent before the link that is being followed.
+    before: (f64, Gaussian<N>, Option<InverseWishart>),
 }
 
 impl<const N: usize> Origin<N> {
     /// A mode that has not changed.
-    pub fn new(weight: f64, state: Gaussian<N>) -> Self {
-        Origin { weight, state, mixed: false, before: (weight, state) }
+    pub fn new(weight: f64, state: Gaussian<N>, extent: Option<InverseWishart>) -> Self {
+        Origin { weight, state, extent, mixed: false, before: (weight, state, extent) }
     }
 }
 
@@ -31,7 +34,9 @@ pub(super) fn mix<const N: usize>(origins: &mut [Origin<N>], leap: &Leap<'_>) {
                 mix_evenly(origins, group, [stay - change, change]);
             }
             _ => {
-                group().for_each(|i| origins[i].before = (origins[i].weight, origins[i].state));
+                group().for_each(|i| {
+                    origins[i].before = (origins[i].weight, origins[i].state, origins[i].extent)
+                });
                 for (j, to) in group().enumerate() {
                     mix_into(origins, group, leap, j, to);
                 }
@@ -49,12 +54,16 @@ fn mix_evenly<const N: usize, I: Iterator<Item = usize> + Clone>(
     let total: f64 = group().map(|i| origins[i].weight).sum();
     let parts = group().filter(|i| origins[*i].weight > 0.0).map(|i| (origins[i].weight, &origins[i].state));
     let together = moments(parts);
+    let extents = blended(group().map(|i| (origins[i].weight, origins[i].extent)));
     for i in group() {
-        let Origin { weight, state, mixed, .. } = &mut origins[i];
+        let Origin { weight, state, extent, mixed, .. } = &mut origins[i];
         // Without anything from others, merging would only round.
         if common * (total - *weight) > 0.0 {
             state.merge(own * *weight, &together, common * total);
             settle(state);
+            if let (Some(extent), Some(extents)) = (extent, &extents) {
+                extent.merge(own * *weight, extents, common * total);
+            }
             *mixed = true;
         }
         *weight = own * *weight + common * total;
@@ -74,11 +83,17 @@ fn mix_into<const N: usize, I: Iterator<Item = usize> + Clone>(
     let own = flow(j, origins[to].before.0);
     if total > own {
         let parts = group().enumerate().filter_map(|(i, from)| {
-            let (weight, state) = &origins[from].before;
+            let (weight, state, _) = &origins[from].before;
             let flow = flow(i, *weight);
             (flow > 0.0).then_some((flow / total, state))
         });
-        (origins[to].state, origins[to].mixed) = (moments(parts), true);
+        let state = moments(parts);
+        let extents = group().enumerate().map(|(i, from)| {
+            let (weight, _, extent) = &origins[from].before;
+            (flow(i, *weight), *extent)
+        });
+        let extent = blended(extents);
+        (origins[to].state, origins[to].extent, origins[to].mixed) = (state, extent, true);
     }
     origins[to].weight = total;
 }

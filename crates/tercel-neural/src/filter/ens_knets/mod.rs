@@ -363,7 +363,7 @@ impl<S: LinearSensor<4, 2>> Filter<4> for EnsKNets<S> {
 
     fn estimate(&self, belief: &EnsKNetsBelief) -> Estimate<4> {
         let Gaussian { mean, covariance } = self.state(belief);
-        Estimate { mean, covariance, modes: belief.probabilities().collect() }
+        Estimate { mean, covariance, modes: belief.probabilities().collect(), extent: None }
     }
 
     fn reach(&self, belief: &EnsKNetsBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {

@@ -141,7 +141,7 @@ impl NeuralImmBelief {
 /// The standard deviation of a step's acceleration, m/s², that a noise stands for over a second.
 fn deviation(noise: AccelerationNoise) -> f64 {
     match noise {
-        AccelerationNoise::Piecewise(deviation) => deviation,
+        AccelerationNoise::Piecewise(deviation) | AccelerationNoise::Jump(deviation) => deviation,
         AccelerationNoise::White(density) => density.sqrt(),
     }
 }
@@ -370,7 +370,7 @@ impl<S: Sensor<4, 2> + Clone> Filter<4> for NeuralImm<S> {
 
     fn estimate(&self, belief: &NeuralImmBelief) -> Estimate<4> {
         let Gaussian { mean, covariance } = self.state(belief);
-        Estimate { mean, covariance, modes: self.corrected(belief).collect() }
+        Estimate { mean, covariance, modes: self.corrected(belief).collect(), extent: None }
     }
 
     fn reach(&self, belief: &NeuralImmBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {

@@ -1,0 +1,187 @@
+//! The studies `vehicle` and `aircraft` as experiments.
+
+use std::collections::BTreeMap;
+
+use tercel_core::motion::Kinematics;
+use tercel_sim::extended::{Generator, Heading, Sizes, Vehicle};
+
+use super::methods::method;
+use super::published::{PUBLISHED, PublishedRow};
+use super::score::{METRICS, score};
+use super::settings::Settings;
+use super::{Aircraft, Method, Recording, Scene, example};
+use crate::StudyError;
+use crate::monte_carlo::{Attempt, Curve, Example, Experiment, Plan, Quantity};
+use crate::report::{Section, Table};
+use crate::studies::Request;
+
+/// The seed of the published tables. It is reserved: nothing is tuned or trained on recordings of this seed.
+pub const SEED: u64 = 7919;
+
+/// Methods that follow extended objects.
+pub struct ExtendedExperiment {
+    plan: Plan,
+    scene: Scene,
+    methods: Vec<Box<dyn Method>>,
+}
+
+impl ExtendedExperiment {
+    /// The study of this name over a scene. `options` says in the tables what was chosen of it, and `settings` are the numbers to
+    /// which filters are tuned.
+    ///
+    /// # Errors
+    /// When a method is not known.
+    fn new(
+        study: &'static str,
+        scene: Scene,
+        settings: &Settings,
+        options: BTreeMap<String, String>,
+        (seed, runs): (u64, u64),
+        names: &[String],
+    ) -> Result<Self, StudyError> {
+        if let Scene::Aircraft(aircraft) = &scene
+            && runs > aircraft.count() as u64
+        {
+            let count = aircraft.count();
+            return Err(StudyError::Option(format!(
+                "there are {count} tracks to test on; expected at most {count} runs"
+            )));
+        }
+        let methods = names.iter().map(|name| method(study, name, settings)).collect::<Result<_, _>>()?;
+        let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            shown,
+        };
+        let plan = Plan {
+            study: study.to_owned(),
+            seed,
+            runs,
+            options,
+            sweep: None,
+            methods: names.to_vec(),
+            metrics: METRICS.map(quantity).to_vec(),
+            curves: curves(&scene),
+        };
+        Ok(ExtendedExperiment { plan, scene, methods })
+    }
+
+    /// The study `vehicle`.
+    pub(crate) fn vehicle(request: &Request<'_>) -> Result<Self, StudyError> {
+        let chosen = |name: &str| request.options.get(name).map_or("", String::as_str);
+        let (generator, settings) = match chosen("generator") {
+            "smooth" => (Generator::Smooth, Settings::SMOOTH),
+            "l1" => (Generator::L1, Settings::L1),
+            _ => (Generator::Reject, Settings::REJECT),
+        };
+        let kinematics = if request.set == "forward" { Kinematics::Forward } else { Kinematics::Backward };
+        let mut vehicle = Vehicle::new(generator).with_kinematics(kinematics);
+        let mut settings = settings;
+        if chosen("sizes") == "random" {
+            vehicle = vehicle.with_sizes(Sizes::MIXED)?;
+            settings = settings.for_mixed_sizes();
+        }
+        let mut options = request.options.clone();
+        options.insert("set".to_owned(), request.set.to_owned());
+        let drawn = (request.seed, request.runs);
+        Self::new("vehicle", Scene::Vehicle(vehicle), &settings, options, drawn, request.methods)
+    }
+
+    /// The study `aircraft`.
+    pub(crate) fn aircraft(request: &Request<'_>) -> Result<Self, StudyError> {
+        let heading = match request.set {
+            "smoothed" => Heading::Smoothed,
+            "crab" => Heading::Crab,
+            _ => Heading::Course,
+        };
+        // The study asks for data before it is built.
+        let path = request.data.unwrap_or(std::path::Path::new(""));
+        let scene = Scene::Aircraft(Aircraft::read(path, heading, true)?);
+        let set = ("set".to_owned(), request.set.to_owned());
+        let data = ("data".to_owned(), path.display().to_string());
+        let drawn = (request.seed, request.runs);
+        Self::new("aircraft", scene, &Settings::AIRCRAFT, [set, data].into(), drawn, request.methods)
+    }
+
+    fn record(&self, run: u64) -> Result<Recording, StudyError> {
+        self.scene.record(self.plan.seed, run)
+    }
+}
+
+fn curves(scene: &Scene) -> Vec<Curve> {
+    let x: Vec<f64> = (0..scene.steps()).map(|step| step as f64 * scene.interval()).collect();
+    let curve = |title: &str, unit: &str, root: bool| Curve {
+        title: title.to_owned(),
+        unit: unit.to_owned(),
+        abscissa: "Time, s".to_owned(),
+        x: x.clone(),
+        root,
+    };
+    vec![
+        curve("Position error over time (element RMSE)", "m", true),
+        curve("Intersection over union, over time", "", false),
+        curve("Squared Gaussian Wasserstein distance over time", "m²", false),
+    ]
+}
+
+/// All published rows of a study, whether the method is here or not.
+fn published_table(study: &str) -> Table {
+    let columns = ["method", "rmse_pos, m", "rmse_vel, m/s", "iou", "gwd, m²"];
+    let heading = "Published figures (RMMNet paper)".to_owned();
+    PUBLISHED.iter().filter(|row| row.study == study).fold(Table::new(heading, columns), |table, row| {
+        table.with_row([
+            row.method.to_owned(),
+            row.rmse_pos.to_string(),
+            row.rmse_vel.to_string(),
+            row.iou.to_string(),
+            row.gwd.to_string(),
+        ])
+    })
+}
+
+impl Experiment for ExtendedExperiment {
+    fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    fn run(&self, _condition: usize, run: u64) -> Vec<Attempt> {
+        match self.record(run) {
+            Ok(recording) => {
+                let steps = recording.scans.len() as u64;
+                let attempt = |method: &dyn Method| {
+                    Attempt::of(
+                        steps,
+                        || method.follow(&recording),
+                        |estimates| score(&recording, &estimates),
+                    )
+                };
+                self.methods.iter().map(|method| attempt(&**method)).collect()
+            }
+            Err(error) => {
+                let failed =
+                    || Attempt { outcome: Err(error.to_string()), time: Default::default(), steps: 0 };
+                self.methods.iter().map(|_| failed()).collect()
+            }
+        }
+    }
+
+    fn published(&self, method: &str, _condition: usize) -> Option<BTreeMap<String, f64>> {
+        PublishedRow::of(method, &self.plan.study).map(PublishedRow::figures)
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        vec![published_table(&self.plan.study).into()]
+    }
+
+    fn example(&self) -> Result<Option<Example>, StudyError> {
+        if self.plan.runs == 0 {
+            return Ok(None);
+        }
+        let recording = self.record(0)?;
+        let names = self.plan.methods.iter().zip(&self.methods);
+        let followed: Vec<_> = names
+            .filter_map(|(name, method)| Some((name.as_str(), method.follow(&recording).ok()?)))
+            .collect();
+        example::draw(&recording, format!("Recording 0 of {}", self.plan.study), &followed).map(Some)
+    }
+}

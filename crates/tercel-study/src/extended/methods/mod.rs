@@ -1,0 +1,88 @@
+//! The methods that the studies of extended objects compare.
+//!
+//! | method | knows | is |
+//! |---|---|---|
+//! | `centroid` | | the mean of the points, and the ellipse of their scatter |
+//! | `b-rmm`, `b-rmm-paper` | | random matrix, the extent as covariance of the points (Koch) |
+//! | `ffk-rmm` | | random matrix with scatter scale and sensor noise (Feldmann, Fränken and Koch) |
+//! | `vb-rmm`, `vb-rmm-paper` | | random matrix, variational (Orguner) |
+//! | `lan-li`, `lan-li-paper` | | random matrix, Wishart prediction; exact and printed degrees of freedom |
+//! | `imm-rmm`, `imm-rmm-paper` | | the same in four interacting modes: straight, accelerating, turning left and right |
+//! | `mem-ekf`, `mem-ekf-paper` | | multiplicative error, linearised (Yang and Baum) |
+//! | `mem-rbpf`, `mem-rbpf-paper` | | multiplicative error with particles of the angle (Steuernagel and Baum) |
+//! | `known-size` | the size | the angle of the scan's greatest likelihood; for aircraft that of the course |
+//! | `aligned` | the size | the angle of velocity and scan together |
+//! | `aligned-ar` | the size | the same with an auto-regressive motion of order 10 that is identified on line |
+//! | `oracle` | the size, the motion | the same with the true motion: the limit of filters on count, mean and scatter |
+//!
+//! The suffix `-paper` is the configuration of the RMMNet paper; a plain name is what we would fly, tuned on other recordings with
+//! scatter scale and sensor noise inside.
+
+mod known;
+mod matrix;
+mod shape;
+
+use super::settings::Settings;
+use super::{Method, Recording, StepEstimate};
+use crate::error::StudyError;
+
+/// Names of all methods of the study `vehicle`, in the order in which they are best read.
+pub const VEHICLE_METHODS: [&str; 18] = [
+    "centroid",
+    "b-rmm-paper",
+    "vb-rmm-paper",
+    "lan-li-paper",
+    "imm-rmm-paper",
+    "mem-ekf-paper",
+    "mem-rbpf-paper",
+    "b-rmm",
+    "ffk-rmm",
+    "vb-rmm",
+    "lan-li",
+    "imm-rmm",
+    "mem-ekf",
+    "mem-rbpf",
+    "known-size",
+    "aligned",
+    "aligned-ar",
+    "oracle",
+];
+
+/// Names of all methods of the study `aircraft`: nobody knows the true motion there.
+pub const AIRCRAFT_METHODS: &[&str] = VEHICLE_METHODS.split_at(17).0;
+
+/// The method of that name, with these numbers.
+///
+/// # Errors
+/// When there is no such method.
+pub(crate) fn method(
+    study: &'static str,
+    name: &str,
+    settings: &Settings,
+) -> Result<Box<dyn Method>, StudyError> {
+    let settings = *settings;
+    Ok(match name {
+        "centroid" => Box::new(matrix::Mean(settings)),
+        "b-rmm" => Box::new(matrix::Matrix::direct(settings)),
+        "ffk-rmm" => Box::new(matrix::Matrix::distorted(settings)),
+        "vb-rmm" => Box::new(matrix::Matrix::variational(settings)),
+        "lan-li" => Box::new(matrix::Matrix::lan_li(settings)),
+        "b-rmm-paper" => Box::new(matrix::PaperMatrix::direct(settings)),
+        "vb-rmm-paper" => Box::new(matrix::PaperMatrix::variational(settings)),
+        "lan-li-paper" => Box::new(matrix::PaperMatrix::lan_li(settings)),
+        "imm-rmm" => Box::new(matrix::Interacting { settings, paper: false }),
+        "imm-rmm-paper" => Box::new(matrix::Interacting { settings, paper: true }),
+        "mem-ekf" => Box::new(shape::Linearised { settings, paper: false }),
+        "mem-ekf-paper" => Box::new(shape::Linearised { settings, paper: true }),
+        "mem-rbpf" => Box::new(shape::Sampled { settings, paper: false }),
+        "mem-rbpf-paper" => Box::new(shape::Sampled { settings, paper: true }),
+        "known-size" => Box::new(known::Sized(settings)),
+        "aligned" => Box::new(known::Straight(settings)),
+        "aligned-ar" => Box::new(known::Regressive(settings)),
+        "oracle" => Box::new(known::Oracle),
+        _ => {
+            let known = VEHICLE_METHODS.join(", ");
+            return Err(StudyError::UnknownMethod { study, name: name.to_owned(), known });
+        }
+    })
+}
