@@ -9,10 +9,14 @@
 mod clutter;
 mod detection;
 mod error;
+mod individuals;
+mod labels;
 mod management;
+mod mixture;
 mod nearest_neighbour;
 mod phd;
 mod track;
+mod vicinity;
 
 use nalgebra::{SMatrix, Vector2};
 
