@@ -3,6 +3,7 @@
 //! | scenario | module | what happens |
 //! |---|---|---|
 //! | `atc-train`, `atc-validation`, `atc-test`, `atc-hshm` | [`air_traffic`] | one aircraft that flies straight and turns, seen by a radar |
+//! | `clutter-partial`, `clutter-all`, `clutter-random` | [`clutter`] | many objects that manoeuvre, among false measurements |
 //!
 //! A scenario is a value that says from which distributions everything is drawn. What is drawn depends on the seed and on
 //! the number of the run alone: run 17 is the same whether it is the only one, one of a thousand, or made on another
@@ -19,6 +20,7 @@
 //! ```
 
 pub mod air_traffic;
+pub mod clutter;
 mod error;
 mod interval;
 mod stream;

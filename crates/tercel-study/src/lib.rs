@@ -7,11 +7,13 @@
 //! | [`studies`] | the studies by name |
 //! | [`monte_carlo`] | carries out studies whose scenes are drawn, on all cores or several machines |
 //! | [`air_traffic`] | the studies of one manoeuvring aircraft |
+//! | [`clutter`] | the studies of many manoeuvring objects in clutter |
 //! | [`autoferry`] | the study on real radar and lidar |
 //! | [`tune`] | fits the numbers of a configuration to recordings |
 
 pub mod air_traffic;
 pub mod autoferry;
+pub mod clutter;
 mod error;
 pub mod evaluate;
 pub mod monte_carlo;

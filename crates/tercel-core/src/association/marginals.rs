@@ -21,16 +21,16 @@ mod tests;
 /// row to column    m_ij = w_ij / (1 + Σ_{k≠j} w_ik n_ik)
 /// column to row    n_ij = 1 / (1 + Σ_{k≠i} m_kj)
 /// ```
-/// which always converge, and whose Bethe free energy stands for the logarithm of the sum. Each pair is then judged by the
-/// sums that remain when it is taken for granted, `p_ij ∝ w_ij Z(without row i and column j)`, which removes most of the
-/// error of the plain messages; in clusters so large that this would take long the plain messages have to do.
+/// which always converge. Where two rows want the same two columns these messages alone err by up to 0.4. So each row is then
+/// looked at together with those that compete with it most: all assignments of these few are enumerated, and only what the
+/// others claim comes from messages.
 ///
 /// ## Use it when
 /// an update weighs all associations instead of deciding for one: joint probabilistic data association.
 ///
 /// ## Reference
 /// Fortmann, Bar-Shalom and Scheffe (1983), section III, for the joint events; Williams and Lau (2014), eqs. 24 to 28, for the
-/// messages; Vontobel (2013), section V, for the free energy. The conditioning is the usual correction of a loop's first order.
+/// messages. The exact surroundings are a deviation; regions larger than a pair are those of Yedidia, Freeman and Weiss (2005).
 ///
 /// ```
 /// use tercel_core::association::Marginals;

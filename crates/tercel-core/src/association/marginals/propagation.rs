@@ -1,17 +1,17 @@
-//! Loopy belief propagation in a large cluster.
+//! Loopy belief propagation in a large cluster, with exact sums in the surroundings of each row.
 
-use super::Local;
+use super::{Entry, Local, enumeration};
 
 /// Rounds of messages at most; they close in by a factor in each.
-const ROUNDS: usize = 200;
+const ROUNDS: usize = 1000;
 
-/// Messages that change by less have converged.
-const CONVERGED: f64 = 1e-7;
+/// Messages that change by less, relative to themselves, have converged.
+const CONVERGED: f64 = 1e-6;
 
-/// Visits of entries up to which each pair is conditioned on.
-const AFFORDABLE: usize = 4_000_000;
+/// Assignments of the surroundings of a row up to which these grow.
+const SURROUNDINGS: usize = 2048;
 
-/// The messages of a cluster, of which one row and one column may be left out.
+/// The messages of a cluster.
 struct Messages<'a> {
     local: &'a Local,
     /// Of each entry, from its row to its column and back.
@@ -25,14 +25,15 @@ struct Messages<'a> {
 /// Finds the probabilities of the entries.
 pub(super) fn solve(local: &mut Local) {
     let mut messages = Messages::new(local);
-    messages.converge(None);
+    messages.converge();
     let plain = messages.probabilities();
-    // Each of the entries asks for some ten rounds over all.
-    let result = if local.entries.len() * local.entries.len() * 10 <= AFFORDABLE {
-        messages.conditioned()
-    } else {
-        plain
-    };
+    let mut region = Region::new(local);
+    let mut result = vec![0.0; local.entries.len()];
+    for row in 0..local.rows {
+        region.grow(&messages, &plain, row);
+        let range = local.starts[row]..local.starts[row + 1];
+        result[range].copy_from_slice(region.solve(&messages));
+    }
     local.result = result;
 }
 
@@ -47,86 +48,119 @@ impl<'a> Messages<'a> {
         }
     }
 
-    /// Sends messages until they stay, from those of the last time, among all rows and columns but those `left_out`.
-    fn converge(&mut self, left_out: Option<(usize, usize)>) {
-        let out = |row, column| left_out.is_some_and(|(r, c)| r == row || c == column);
+    /// Sends messages until they stay.
+    fn converge(&mut self) {
         for _ in 0..ROUNDS {
             self.rows.fill(0.0);
             self.columns.fill(0.0);
             for (entry, message) in self.local.entries.iter().zip(&self.to_row) {
-                if !out(entry.row, entry.column) {
-                    self.rows[entry.row] += entry.weight * message;
-                }
+                self.rows[entry.row] += entry.weight * message;
             }
             for (place, entry) in self.local.entries.iter().enumerate() {
-                if !out(entry.row, entry.column) {
-                    let others = (self.rows[entry.row] - entry.weight * self.to_row[place]).max(0.0);
-                    self.to_column[place] = entry.weight / (1.0 + others);
-                    self.columns[entry.column] += self.to_column[place];
-                }
+                let others = (self.rows[entry.row] - entry.weight * self.to_row[place]).max(0.0);
+                self.to_column[place] = entry.weight / (1.0 + others);
+                self.columns[entry.column] += self.to_column[place];
             }
             let mut change = 0.0_f64;
             for (place, entry) in self.local.entries.iter().enumerate() {
-                if !out(entry.row, entry.column) {
-                    let others = (self.columns[entry.column] - self.to_column[place]).max(0.0);
-                    let message = 1.0 / (1.0 + others);
-                    change = change.max((message - self.to_row[place]).abs());
-                    self.to_row[place] = message;
-                }
+                let others = (self.columns[entry.column] - self.to_column[place]).max(0.0);
+                let message = 1.0 / (1.0 + others);
+                change = change.max((message / self.to_row[place] - 1.0).abs());
+                self.to_row[place] = message;
             }
             if change < CONVERGED {
                 break;
             }
         }
-        // The sums belong to the last messages.
-        self.rows.fill(0.0);
-        for (entry, message) in self.local.entries.iter().zip(&self.to_row) {
-            if !out(entry.row, entry.column) {
-                self.rows[entry.row] += entry.weight * message;
-            }
-        }
     }
 
+    /// What the messages alone say.
     fn probabilities(&self) -> Vec<f64> {
         let entries = self.local.entries.iter().zip(&self.to_row);
         entries.map(|(entry, message)| entry.weight * message / (1.0 + self.rows[entry.row])).collect()
     }
+}
 
-    /// Logarithm of the Bethe approximation to the sum over all assignments, from messages that have converged.
-    fn ln_sum(&self, left_out: (usize, usize)) -> f64 {
-        let others = |count: &[f64], out: usize| -> f64 {
-            count.iter().enumerate().filter(|(i, _)| *i != out).map(|(_, sum)| sum.ln_1p()).sum()
-        };
-        let pairs = self.local.entries.iter().zip(&self.to_column).zip(&self.to_row);
-        let shared: f64 = pairs
-            .filter(|((entry, _), _)| entry.row != left_out.0 && entry.column != left_out.1)
-            .map(|((_, to_column), to_row)| (to_column * to_row).ln_1p())
-            .sum();
-        others(&self.rows, left_out.0) + others(&self.columns, left_out.1) - shared
+/// A row with those that compete with it most.
+struct Region {
+    /// Entries of each column.
+    by_column: Vec<Vec<usize>>,
+    rows: Vec<usize>,
+    inside: Vec<bool>,
+    /// How much each row competes with those inside, and the rows of which this is not zero.
+    pull: Vec<f64>,
+    touched: Vec<usize>,
+    part: Local,
+}
+
+impl Region {
+    fn new(local: &Local) -> Self {
+        let mut by_column = vec![Vec::new(); local.columns];
+        for (place, entry) in local.entries.iter().enumerate() {
+            by_column[entry.column].push(place);
+        }
+        Region {
+            by_column,
+            rows: Vec::new(),
+            inside: vec![false; local.rows],
+            pull: vec![0.0; local.rows],
+            touched: Vec::new(),
+            part: Local::default(),
+        }
     }
 
-    /// Probabilities from the sums that remain when each pair, or the absence of any, is taken for granted.
-    fn conditioned(&mut self) -> Vec<f64> {
-        const NO_COLUMN: usize = usize::MAX;
-        let mut result = vec![0.0; self.local.entries.len()];
-        let settled = self.to_row.clone();
-        let local = self.local;
-        for row in 0..local.rows {
+    /// Starts with one row and takes in the strongest competitors, while the assignments stay few enough to be enumerated.
+    fn grow(&mut self, messages: &Messages<'_>, plain: &[f64], first: usize) {
+        let local = messages.local;
+        self.rows.drain(..).for_each(|row| self.inside[row] = false);
+        self.touched.drain(..).for_each(|row| self.pull[row] = 0.0);
+        let (mut next, mut events) = (Some(first), 1);
+        while let Some(row) = next {
             let range = local.starts[row]..local.starts[row + 1];
-            let mut ln_sum_without = |column: usize| {
-                self.to_row.clone_from(&settled);
-                self.converge(Some((row, column)));
-                self.ln_sum((row, column))
-            };
-            let alone = ln_sum_without(NO_COLUMN);
-            let mut sum = 1.0;
-            for place in range.clone() {
-                let entry = local.entries[place];
-                result[place] = entry.weight * (ln_sum_without(entry.column) - alone).exp();
-                sum += result[place];
+            events *= range.len() + 1;
+            if events > SURROUNDINGS && row != first {
+                break;
             }
-            result[range].iter_mut().for_each(|share| *share /= sum);
+            self.inside[row] = true;
+            self.rows.push(row);
+            for place in range {
+                for &other in &self.by_column[local.entries[place].column] {
+                    let rival = local.entries[other].row;
+                    if self.pull[rival] == 0.0 {
+                        self.touched.push(rival);
+                    }
+                    // Never zero, so that each row is listed once.
+                    self.pull[rival] += (plain[place] * plain[other]).max(f64::MIN_POSITIVE);
+                }
+            }
+            let outside = self.touched.iter().copied().filter(|&row| !self.inside[row]);
+            next = outside.max_by(|&a, &b| self.pull[a].total_cmp(&self.pull[b]).then(b.cmp(&a)));
         }
-        result
+    }
+
+    /// Probabilities of the entries of the first row, by the sum over the assignments of the region. What the rows outside
+    /// claim of its columns is what their messages say.
+    fn solve(&mut self, messages: &Messages<'_>) -> &[f64] {
+        let (local, part) = (messages.local, &mut self.part);
+        part.entries.clear();
+        part.starts.clear();
+        part.result.clear();
+        (part.rows, part.columns) = (self.rows.len(), local.columns);
+        for (number, &row) in self.rows.iter().enumerate() {
+            part.starts.push(part.entries.len());
+            for place in local.starts[row]..local.starts[row + 1] {
+                let Entry { column, weight, .. } = local.entries[place];
+                let rivals = self.by_column[column].iter();
+                let claimed: f64 = rivals
+                    .filter(|&&other| !self.inside[local.entries[other].row])
+                    .map(|&other| messages.to_column[other])
+                    .sum();
+                part.entries.push(Entry { row: number, column, weight: weight / (1.0 + claimed), place });
+            }
+        }
+        part.starts.push(part.entries.len());
+        part.result.resize(part.entries.len(), 0.0);
+        enumeration::solve(part);
+        &part.result[..part.starts[1]]
     }
 }

@@ -53,7 +53,7 @@ fn on_one_object_it_is_the_bernoulli_filter() {
         survival,
         undetected: 1e-4,
         birth: 0.0,
-        hypotheses: 1_000_000,
+        hypotheses: usize::MAX >> 20,
         prune: 1e-15,
         merge: 0.0,
         management: Management { min_existence: 1e-12, max_misses: 100, ..Management::default() },
