@@ -27,7 +27,7 @@ use super::{Management, Scan, Track, Tracker, TrackerError, Use, birth_weight, c
 /// light ones go; objects that hardly exist go. Each measurement starts an object for the next scan, in the measure in which
 /// nothing explains it.
 ///
-/// A legacy object keeps its label; a measured one has that of the object that gave most to it. Tracks are labels, read as
+/// A legacy object keeps its label; a measured one has that of the object whose belief gave most to it. Tracks are labels, read as
 /// in [`Phd`](super::Phd), where the terms are the objects.
 ///
 /// ## Use it when
@@ -130,7 +130,7 @@ struct Scratch<B> {
 struct Measured<B> {
     numerator: f64,
     denominator: f64,
-    /// Label of the object that gave most, and how much that was.
+    /// Label of the object whose belief gave most, and how much that was.
     label: Option<(f64, Label)>,
     beliefs: Vec<Term<B, ()>>,
 }
@@ -301,7 +301,7 @@ impl<B: Clone> MultiBernoulli<B> {
 }
 
 impl<B> Measured<B> {
-    /// Takes the label of the object with the largest part.
+    /// Takes the label of an object if the part of its belief is the largest so far.
     fn claim(&mut self, part: f64, label: &Label) {
         if self.label.is_none_or(|(largest, _)| part > largest) {
             self.label = Some((part, *label));

@@ -42,7 +42,7 @@ pub(super) const CURVES: [(&str, &str); 5] = [
 ];
 
 /// Scores what a method reported.
-pub(super) fn score(recording: &Recording, reported: &[Vec<Reported>]) -> Result<Outcome, String> {
+pub fn score(recording: &Recording, reported: &[Vec<Reported>]) -> Result<Outcome, String> {
     figures(recording, reported).map_err(|error| error.to_string())
 }
 

@@ -105,7 +105,8 @@ fn trees_that_have_nothing_to_do_with_each_other_are_in_clusters_of_their_own() 
         tracker.step(&filter, &scan).unwrap();
     }
     let confirmed = tracker.tracks().iter().filter(|track| track.status == Status::Confirmed).count();
-    assert_eq!(confirmed, 9);
+    let all: Vec<_> = tracker.tracks().iter().map(|t| (t.id, t.existence, t.status, t.belief.mean)).collect();
+    assert_eq!(confirmed, 9, "{all:?}");
     assert!(tracker.clusters.iter().all(|cluster| cluster.trees.len() < 6));
     assert!(tracker.hypotheses().sum::<usize>() < 200);
 }

@@ -12,10 +12,11 @@ use tercel_sim::clutter::Sensor;
 const SPEED: f64 = 20.0;
 
 /// Spectral density of the one straight motion, m²/s³.
-const STRAIGHT: f64 = 2.0;
+const STRAIGHT: f64 = 8.0;
 
 /// Turn rates (degrees per second) and spectral densities (m²/s³) of our bank.
-const BANK: [(f64, f64); 6] = [(0.0, 0.15), (5.0, 0.4), (-5.0, 0.4), (10.0, 0.4), (-10.0, 0.4), (0.0, 2.0)];
+const BANK: [(f64, f64); 6] =
+    [(0.0, 0.05), (5.0, 0.16), (-5.0, 0.16), (10.0, 0.16), (-10.0, 0.16), (0.0, 4.0)];
 
 /// Probability of keeping the mode over a second.
 const STAY: f64 = 0.95;

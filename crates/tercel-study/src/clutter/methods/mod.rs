@@ -33,7 +33,7 @@ pub const METHODS: [&str; 7] =
 pub fn method(name: &str) -> Result<Box<dyn Method>, StudyError> {
     Ok(match name {
         "gm-phd" => Box::new(Tracked::new(filters::straight, trackers::phd)),
-        "imm-phd-paper" => Box::new(Tracked::new(filters::published, trackers::phd_paper)),
+        "imm-phd-paper" => Box::new(Tracked::new(filters::published, trackers::phd)),
         "imm-phd" => Box::new(Tracked::new(filters::bank, trackers::phd)),
         "imm-member" => Box::new(Tracked::new(filters::bank, trackers::multi_bernoulli)),
         "imm-jpda-paper" => Box::new(Tracked::new(filters::published, trackers::jpda_paper)),

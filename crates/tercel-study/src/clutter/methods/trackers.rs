@@ -15,17 +15,20 @@ const GATE: f64 = 0.999_45;
 /// The published rule: confirmed by three detections, given up after more than two scans without one.
 fn three_hits() -> Management {
     Management {
-        confirm: Confirmation::Hits { hits: 3, scans: 4 },
+        confirm: Confirmation::Hits { hits: 3, scans: 8 },
         min_existence: 1e-6,
         max_misses: 2,
         ..Management::default()
     }
 }
 
-fn phd_config(birth: f64) -> Result<PhdConfig, FilterError> {
-    Ok(PhdConfig {
+/// Probability that an unexplained measurement is a new object. The publication has 0.3, which means twelve new objects a scan.
+const BIRTH: f64 = 0.05;
+
+pub(super) fn phd<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
+    Phd::new(PhdConfig {
         gate: Gate::new(GATE)?,
-        birth,
+        birth: BIRTH,
         prune: 1e-5,
         merge: 4.0,
         cap: 500,
@@ -35,18 +38,10 @@ fn phd_config(birth: f64) -> Result<PhdConfig, FilterError> {
     })
 }
 
-pub(super) fn phd<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
-    Phd::new(phd_config(0.02)?)
-}
-
-pub(super) fn phd_paper<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
-    Phd::new(phd_config(0.05)?)
-}
-
 pub(super) fn multi_bernoulli<B>(_: &Recording) -> Result<MultiBernoulli<B>, FilterError> {
     MultiBernoulli::new(MultiBernoulliConfig {
         gate: Gate::new(GATE)?,
-        birth: 0.02,
+        birth: BIRTH,
         management: three_hits(),
         ..MultiBernoulliConfig::default()
     })
@@ -55,7 +50,7 @@ pub(super) fn multi_bernoulli<B>(_: &Recording) -> Result<MultiBernoulli<B>, Fil
 pub(super) fn jpda<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
     Jpda::new(JpdaConfig {
         gate: Gate::new(GATE)?,
-        birth: 0.02,
+        birth: BIRTH,
         management: Management {
             confirm: Confirmation::Existence(0.9),
             min_existence: 1e-3,
@@ -69,8 +64,8 @@ pub(super) fn jpda<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
 pub(super) fn jpda_paper<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
     Jpda::new(JpdaConfig {
         gate: Gate::new(GATE)?,
-        birth: 0.3,
-        management: Management { min_existence: 1e-9, ..three_hits() },
+        birth: BIRTH,
+        management: three_hits(),
         ..JpdaConfig::default()
     })
 }
