@@ -15,6 +15,7 @@ mod constant_acceleration;
 mod constant_velocity;
 mod coordinated_turn;
 mod random_walk;
+mod sampled;
 mod singer;
 mod turn;
 
@@ -26,6 +27,8 @@ pub use constant_acceleration::ConstantAcceleration;
 pub use constant_velocity::ConstantVelocity;
 pub use coordinated_turn::CoordinatedTurn;
 pub use random_walk::RandomWalk;
+pub(crate) use sampled::Noise;
+pub use sampled::Sampled;
 pub use singer::Singer;
 pub use turn::Turn;
 
