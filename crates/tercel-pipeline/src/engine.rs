@@ -6,7 +6,9 @@ use tercel_core::filter::{Filter, Transition};
 use tercel_core::motion::{
     ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Motion, RandomWalk, Singer, Turn,
 };
-use tercel_core::multi::{self, NearestNeighbour, Phd, Tracker, TrackerError, Use};
+use tercel_core::multi::{
+    self, Jpda, MultiBernoulli, NearestNeighbour, Phd, Pmbm, Tracker, TrackerError, Use,
+};
 use tercel_core::sensor::{Measurement, Sensor};
 use tercel_data::table::{self, Scan};
 
@@ -87,6 +89,18 @@ where
         }
         TrackerConfig::Phd(settings) => {
             let tracker = settings.build().and_then(Phd::<R::Belief>::new).map_err(key)?;
+            Box::new(Runner { recursion, tracker })
+        }
+        TrackerConfig::MultiBernoulli(settings) => {
+            let tracker = settings.build().and_then(MultiBernoulli::<R::Belief>::new).map_err(key)?;
+            Box::new(Runner { recursion, tracker })
+        }
+        TrackerConfig::Jpda(settings) => {
+            let tracker = settings.build().and_then(Jpda::<R::Belief>::new).map_err(key)?;
+            Box::new(Runner { recursion, tracker })
+        }
+        TrackerConfig::Pmbm(settings) => {
+            let tracker = settings.build().and_then(Pmbm::<R::Belief>::new).map_err(key)?;
             Box::new(Runner { recursion, tracker })
         }
     })

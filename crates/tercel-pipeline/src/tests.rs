@@ -58,10 +58,11 @@ fn every_motion_filter_and_sensor_tracks_a_plain_object() {
             "{ polar = { range_deviation = 5.0, bearing_deviation = 0.01, range_rate_deviation = 1.0 } }",
         ),
     ];
-    let trackers = ["[tracker.nearest_neighbour]", "[tracker.phd]"];
+    let names = ["nearest_neighbour", "phd", "multi_bernoulli", "jpda", "pmbm"];
+    let trackers = names.map(|name| format!("[tracker.{name}]"));
     for motion in &motions {
         for (kind, measures) in sensors {
-            for tracker in trackers {
+            for tracker in &trackers {
                 // A random walk knows no velocity for a range rate to measure.
                 if motion.starts_with("random_walk") && measures.contains("rate_deviation") {
                     continue;

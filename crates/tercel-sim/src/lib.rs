@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `atc-train`, `atc-validation`, `atc-test`, `atc-hshm` | [`air_traffic`] | one aircraft that flies straight and turns, seen by a radar |
 //! | vehicles, aircraft, crossings | [`extended`] | ellipses that move, seen as many points a scan |
+//! | `clutter-partial`, `clutter-all`, `clutter-random` | [`clutter`] | many objects that manoeuvre, among false measurements |
 //!
 //! A scenario is a value that says from which distributions everything is drawn. What is drawn depends on the seed and on
 //! the number of the run alone: run 17 is the same whether it is the only one, one of a thousand, or made on another
@@ -20,6 +21,7 @@
 //! ```
 
 pub mod air_traffic;
+pub mod clutter;
 mod error;
 pub mod extended;
 mod interval;

@@ -28,6 +28,11 @@ pub enum Stream {
         /// Number of the measurement campaign; 0 is the usual one.
         realisation: u64,
     },
+    /// Measurements of nothing: how many there are in each scan, and where.
+    Clutter {
+        /// Number of the measurement campaign; 0 is the usual one.
+        realisation: u64,
+    },
 }
 
 impl Stream {
@@ -37,6 +42,7 @@ impl Stream {
             Stream::Truth => (1, 0),
             Stream::Noise { realisation } => (2, realisation),
             Stream::Detection { realisation } => (3, realisation),
+            Stream::Clutter { realisation } => (4, realisation),
         };
         let mut key = [0; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());

@@ -7,6 +7,7 @@
 //! | [`studies`] | the studies by name |
 //! | [`monte_carlo`] | carries out studies whose scenes are drawn, on all cores or several machines |
 //! | [`air_traffic`] | the studies of one manoeuvring aircraft |
+//! | [`clutter`] | the studies of many manoeuvring objects in clutter |
 //! | [`extended`] | the studies of one object that is seen as many points |
 //! | [`extended_scene`] | the study of several such objects that cross |
 //! | [`autoferry`] | the study on real radar and lidar |
@@ -14,6 +15,7 @@
 
 pub mod air_traffic;
 pub mod autoferry;
+pub mod clutter;
 mod error;
 pub mod evaluate;
 pub mod extended;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::air_traffic::{self, AirTrafficExperiment};
 use crate::autoferry;
+use crate::clutter::{self, ClutterExperiment};
 use crate::error::StudyError;
 use crate::extended::{self, ExtendedExperiment};
 use crate::extended_scene::{self, ExtendedSceneExperiment};
@@ -108,7 +109,7 @@ fn boxed<E: Experiment + 'static>(
 }
 
 /// All studies.
-pub const STUDIES: [Study; 9] = [
+pub const STUDIES: [Study; 12] = [
     Study {
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
@@ -214,6 +215,45 @@ pub const STUDIES: [Study; 9] = [
             options: &[],
             data: false,
             build: |r| boxed(ExtendedSceneExperiment::new(r)),
+        }),
+    },
+    Study {
+        name: "clutter-partial",
+        about: "nine objects in dense clutter, two of which manoeuvre (Figs. 2 and 3)",
+        methods: &clutter::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: clutter::SEED,
+            runs: 100,
+            sets: &[],
+            options: &[],
+            data: false,
+            build: |r| boxed(ClutterExperiment::new("clutter-partial", r.seed, r.runs, r.methods)),
+        }),
+    },
+    Study {
+        name: "clutter-all",
+        about: "six objects in clutter that all manoeuvre at once (Figs. 4 and 5)",
+        methods: &clutter::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: clutter::SEED,
+            runs: 100,
+            sets: &[],
+            options: &[],
+            data: false,
+            build: |r| boxed(ClutterExperiment::new("clutter-all", r.seed, r.runs, r.methods)),
+        }),
+    },
+    Study {
+        name: "clutter-random",
+        about: "random scenes of 5 to 12 objects that come, go and manoeuvre in clutter",
+        methods: &clutter::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            seed: clutter::SEED,
+            runs: 100,
+            sets: &[],
+            options: &[],
+            data: false,
+            build: |r| boxed(ClutterExperiment::new("clutter-random", r.seed, r.runs, r.methods)),
         }),
     },
     Study {
@@ -413,9 +453,17 @@ mod tests {
 
     #[test]
     fn a_plan_gives_its_experiment_back() {
-        for name in
-            ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "atc-ablation", "vehicle", "extended-scene"]
-        {
+        for name in [
+            "atc-test",
+            "atc-hshm",
+            "atc-noise",
+            "atc-missing",
+            "atc-ablation",
+            "vehicle",
+            "extended-scene",
+            "clutter-all",
+            "clutter-random",
+        ] {
             let choice = Choice { runs: Some(3), seed: Some(u64::MAX), ..Choice::default() };
             let plan = Study::find(name).unwrap().experiment(&choice).unwrap().plan().clone();
             assert_eq!(experiment_of(&plan).unwrap().plan(), &plan);

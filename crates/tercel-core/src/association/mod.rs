@@ -1,9 +1,14 @@
 //! Which measurement may belong to which object.
 
 mod assignment;
+pub(crate) mod clusters;
 mod gate;
+mod k_best;
+mod marginals;
 mod threshold;
 
 pub use assignment::{Assignment, AssignmentError, AssignmentSolver};
 pub use gate::PlaceIndex;
+pub use k_best::{KBest, Ranked};
+pub use marginals::Marginals;
 pub use threshold::Gate;

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::{Filter, Innovation, sampling};
 use crate::belief::{Cholesky, Gaussian, positive};
 use crate::error::FilterError;
-use crate::motion::Motion;
+use crate::motion::Sampled;
 use crate::sensor::{Measurement, Reading, Sensor};
 
 /// Estimates the state of an object by many weighted guesses, for motion and sensors of any shape.
@@ -62,26 +62,45 @@ pub struct Particle<T, S, const M: usize = 2> {
 
 /// What a [`Particle`] filter knows of one object: weighted states, and the generator that moves them on.
 #[derive(Debug, PartialEq)]
-pub struct Particles<const N: usize> {
+pub struct Particles<const N: usize, U = ()> {
     states: Vec<SVector<f64, N>>,
+    /// What the motion carries with each.
+    memories: Vec<U>,
     /// Logarithms of the weights, which add up to one.
     weights: Vec<f64>,
     random: ChaCha8Rng,
-    room: Room<N>,
+    room: Room<N, U>,
 }
 
 /// Room for the next states and weights: a step does not allocate.
 #[derive(Debug, PartialEq)]
-struct Room<const N: usize> {
+struct Room<const N: usize, U> {
     states: Vec<SVector<f64, N>>,
+    memories: Vec<U>,
     weights: Vec<f64>,
+    /// Numbers of particles, and those that are drawn.
+    numbers: Vec<usize>,
+    chosen: Vec<usize>,
 }
 
-impl<const N: usize> Clone for Particles<N> {
+impl<const N: usize, U> Room<N, U> {
+    fn new(count: usize) -> Self {
+        Room {
+            states: Vec::with_capacity(count),
+            memories: Vec::with_capacity(count),
+            weights: Vec::with_capacity(count),
+            numbers: Vec::with_capacity(count),
+            chosen: Vec::with_capacity(count),
+        }
+    }
+}
+
+impl<const N: usize, U: Clone> Clone for Particles<N, U> {
     fn clone(&self) -> Self {
-        let room = Room { states: Vec::new(), weights: Vec::new() };
+        let room = Room::new(0);
         Particles {
             states: self.states.clone(),
+            memories: self.memories.clone(),
             weights: self.weights.clone(),
             random: self.random.clone(),
             room,
@@ -91,12 +110,18 @@ impl<const N: usize> Clone for Particles<N> {
     // Trackers copy beliefs into buffers of the last scan; their room is used again.
     fn clone_from(&mut self, source: &Self) {
         self.states.clone_from(&source.states);
+        self.memories.clone_from(&source.memories);
         self.weights.clone_from(&source.weights);
         self.random.clone_from(&source.random);
     }
 }
 
-impl<const N: usize> Particles<N> {
+impl<const N: usize, U: Clone> Particles<N, U> {
+    /// What the motion carries with each particle.
+    pub fn memories(&self) -> &[U] {
+        &self.memories
+    }
+
     /// The particles.
     pub fn states(&self) -> &[SVector<f64, N>] {
         &self.states
@@ -134,15 +159,34 @@ impl<const N: usize> Particles<N> {
 
     /// Draws `count` particles with a chance equal to their weight, each about as often as it should be, from these particles
     /// and those of `other`, whose weights count `other_share` against the rest.
-    fn resample(&mut self, count: usize, other: Option<(&Particles<N>, f64)>) {
+    fn resample(&mut self, count: usize, other: Option<(&Particles<N, U>, f64)>) {
         let share = 1.0 - other.map_or(0.0, |(_, share)| share);
-        let others = other.into_iter().flat_map(|(particles, share)| {
-            particles.weighted().map(move |(weight, state)| (share * weight, state))
-        });
-        let own = self.weights.iter().map(|weight| share * weight.exp()).zip(&self.states);
+        let own = self.states.len();
+        let all = own + other.map_or(0, |(particles, _)| particles.states.len());
+        let Room { states, memories, numbers, chosen, .. } = &mut self.room;
+        // Numbers from `own` on are those of the other particles.
+        numbers.clear();
+        numbers.extend(0..all);
+        let weights = self.weights.iter().map(|weight| share * weight.exp());
+        let others = other
+            .into_iter()
+            .flat_map(|(particles, share)| particles.weights.iter().map(move |weight| share * weight.exp()));
         let offset = self.random.random();
-        sampling::resample(own.chain(others), offset, count, &mut self.room.states);
-        std::mem::swap(&mut self.states, &mut self.room.states);
+        sampling::resample(weights.chain(others).zip(&*numbers), offset, count, chosen);
+        states.clear();
+        memories.clear();
+        for &number in &*chosen {
+            let (source, place) = match other {
+                Some((particles, _)) if number >= own => {
+                    ((&particles.states, &particles.memories), number - own)
+                }
+                _ => ((&self.states, &self.memories), number),
+            };
+            states.push(source.0[place]);
+            memories.push(source.1[place].clone());
+        }
+        std::mem::swap(&mut self.states, states);
+        std::mem::swap(&mut self.memories, memories);
         self.weights.clear();
         self.weights.resize(count, -(count as f64).ln());
     }
@@ -223,9 +267,9 @@ impl<T, S, const M: usize> Particle<T, S, M> {
 
     /// How the measurement compares with each particle: the innovation, after `each` has seen the logarithms of the
     /// particles' new weights before they are normalised.
-    fn compare<const N: usize>(
+    fn compare<const N: usize, U: Clone>(
         &self,
-        belief: &Particles<N>,
+        belief: &Particles<N, U>,
         measurement: &Measurement<M>,
         mut each: impl FnMut(f64),
     ) -> Result<Innovation, FilterError>
@@ -268,38 +312,30 @@ impl<T, S, const M: usize> Particle<T, S, M> {
 
 impl<const N: usize, const M: usize, T, S> Filter<N> for Particle<T, S, M>
 where
-    T: Motion<N>,
+    T: Sampled<N>,
     S: Sensor<N, M>,
 {
-    type Belief = Particles<N>;
+    type Belief = Particles<N, T::Memory>;
     type Measurement = Measurement<M>;
 
-    fn birth(&self, measurement: &Measurement<M>) -> Result<Particles<N>, FilterError> {
+    fn birth(&self, measurement: &Measurement<M>) -> Result<Particles<N, T::Memory>, FilterError> {
         let start = self.sensor.birth(measurement, &self.motion.prior())?;
         let lower = *Cholesky::new(&start.covariance, "state covariance")?.lower();
         let mut random = ChaCha8Rng::seed_from_u64(sampling::seed_of(self.seed, measurement));
         let states: Vec<_> = (0..self.count).map(|_| start.mean + lower * normal(&mut random)).collect();
         let weights = vec![-(self.count as f64).ln(); self.count];
-        let room = Room { states: Vec::with_capacity(self.count), weights: Vec::with_capacity(self.count) };
-        Ok(Particles { states, weights, random, room })
+        let memories = (0..self.count).map(|_| self.motion.start(&mut random)).collect();
+        Ok(Particles { states, memories, weights, random, room: Room::new(self.count) })
     }
 
-    fn predict(&self, belief: &mut Particles<N>, dt: f64) {
-        // Most motions have the same noise everywhere; its root is taken again only where it differs.
-        let mut noise = SMatrix::zeros();
-        let mut root = SMatrix::zeros();
-        for state in &mut belief.states {
-            let here = self.motion.noise(state, dt);
-            if here != noise {
-                (noise, root) = (here, positive::root(&here));
-            }
-            *state = self.motion.transition(state, dt) + root * normal(&mut belief.random);
-        }
+    fn predict(&self, belief: &mut Particles<N, T::Memory>, dt: f64) {
+        let Particles { states, memories, random, .. } = belief;
+        self.motion.sample(states, memories, dt, random);
     }
 
     fn update(
         &self,
-        belief: &mut Particles<N>,
+        belief: &mut Particles<N, T::Memory>,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         let mut weights = std::mem::take(&mut belief.room.weights);
@@ -322,24 +358,30 @@ where
 
     fn innovation(
         &self,
-        belief: &Particles<N>,
+        belief: &Particles<N, T::Memory>,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         self.compare(belief, measurement, |_| ())
     }
 
-    fn state(&self, belief: &Particles<N>) -> Gaussian<N> {
+    fn state(&self, belief: &Particles<N, T::Memory>) -> Gaussian<N> {
         belief.moments()
     }
 
     /// Moves and stretches the cloud, which keeps its shape and weights.
-    fn set_state(&self, belief: &mut Particles<N>, state: &Gaussian<N>) {
+    fn set_state(&self, belief: &mut Particles<N, T::Memory>, state: &Gaussian<N>) {
         belief.reshape(state);
     }
 
     /// Resamples both clouds as one. The result is stretched to the moments of the two, which resampling alone would only
     /// meet on average.
-    fn merge(&self, belief: &mut Particles<N>, weight: f64, other: &Particles<N>, other_weight: f64) {
+    fn merge(
+        &self,
+        belief: &mut Particles<N, T::Memory>,
+        weight: f64,
+        other: &Particles<N, T::Memory>,
+        other_weight: f64,
+    ) {
         let total = weight + other_weight;
         if total <= 0.0 || other_weight <= 0.0 {
             return;
@@ -350,7 +392,7 @@ where
         belief.reshape(&target);
     }
 
-    fn reach(&self, belief: &Particles<N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+    fn reach(&self, belief: &Particles<N, T::Memory>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
         super::gaussian::reach(&self.sensor, &belief.moments())
     }
 

@@ -19,6 +19,7 @@ mod constant_velocity;
 mod coordinated_turn;
 mod padded;
 mod random_walk;
+mod sampled;
 mod singer;
 mod turn;
 
@@ -33,6 +34,8 @@ pub use constant_velocity::ConstantVelocity;
 pub use coordinated_turn::CoordinatedTurn;
 pub use padded::PaddedMotion;
 pub use random_walk::RandomWalk;
+pub(crate) use sampled::Noise;
+pub use sampled::Sampled;
 pub use singer::Singer;
 pub use turn::Turn;
 

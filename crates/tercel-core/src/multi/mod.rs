@@ -4,15 +4,29 @@
 //! | tracker | associates | for |
 //! |---|---|---|
 //! | [`NearestNeighbour`] | each measurement to at most one track, jointly at the least cost | clear pictures, thousands of objects |
+//! | [`Jpda`] | each track with all measurements near it, by their joint probabilities | dense clutter, objects that pass close |
 //! | [`Phd`] | nothing: it estimates the intensity of objects | dense clutter, objects that come and go |
+//! | [`MultiBernoulli`] | nothing: it estimates a set of objects that may exist | the same, seen nearly always |
+//! | [`Pmbm`] | by hypotheses, the most probable of which are kept | the least errors, at some cost |
+//!
+//! With a [`Particle`](crate::filter::Particle) filter, [`Phd`] and [`MultiBernoulli`] are their sequential Monte Carlo forms
+//! (SMC-PHD, SMC-CB-MeMBer): each term of the mixture is a cloud of particles, which prediction, update and merging treat as
+//! such. With an [`Imm`](crate::filter::Imm), any tracker follows motion that changes between models.
 
 mod clutter;
 mod detection;
 mod error;
+mod individuals;
+mod jpda;
+mod labels;
 mod management;
+mod mixture;
+mod multi_bernoulli;
 mod nearest_neighbour;
 mod phd;
+mod pmbm;
 mod track;
+mod vicinity;
 
 use nalgebra::{SMatrix, Vector2};
 
@@ -22,9 +36,12 @@ use crate::filter::Filter;
 pub use clutter::{Clutter, ClutterMap};
 pub use detection::Detection;
 pub use error::TrackerError;
+pub use jpda::{Jpda, JpdaConfig};
 pub use management::{Confirmation, Management};
+pub use multi_bernoulli::{MultiBernoulli, MultiBernoulliConfig};
 pub use nearest_neighbour::{NearestNeighbour, NearestNeighbourConfig};
 pub use phd::{Phd, PhdConfig};
+pub use pmbm::{Pmbm, PmbmConfig};
 pub use track::{Status, Track, TrackId, Use};
 
 /// What one sensor saw at one time, and how it sees.

@@ -1,13 +1,12 @@
 //! Global nearest neighbour tracker with existence probabilities.
 
-use crate::association::{AssignmentSolver, Gate, PlaceIndex};
+use crate::association::{AssignmentSolver, Gate};
 use crate::error::FilterError;
 use crate::filter::Filter;
 
-use super::{
-    Management, Scan, Status, Track, TrackId, Tracker, TrackerError, Use, birth_weight, error, ln_clutter_at,
-    places, plane, ratio,
-};
+use super::individuals::Individuals;
+use super::vicinity::Vicinity;
+use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutter_at, places};
 
 /// Gives each track at most one measurement and each measurement to at most one track, so that the whole scan is explained
 /// at the least cost, and keeps the probability that each track exists.
@@ -54,9 +53,7 @@ use super::{
 #[derive(Debug, Clone)]
 pub struct NearestNeighbour<B> {
     config: NearestNeighbourConfig,
-    tracks: Vec<Track<B>>,
-    uses: Vec<Use>,
-    next: TrackId,
+    objects: Individuals<B>,
     time: Option<f64>,
     scratch: Scratch,
 }
@@ -91,8 +88,7 @@ impl Default for NearestNeighbourConfig {
 /// Buffers that keep their memory from scan to scan.
 #[derive(Debug, Clone, Default)]
 struct Scratch {
-    index: PlaceIndex,
-    near: Vec<usize>,
+    vicinity: Vicinity,
     solver: AssignmentSolver,
     /// (track, measurement, cost) of the pairs in a gate.
     pairs: Vec<(usize, usize, f64)>,
@@ -113,9 +109,7 @@ impl<B> NearestNeighbour<B> {
         FilterError::probability("birth probability", config.birth)?;
         Ok(NearestNeighbour {
             config,
-            tracks: Vec::new(),
-            uses: Vec::new(),
-            next: 1,
+            objects: Individuals::default(),
             time: None,
             scratch: Scratch::default(),
         })
@@ -123,39 +117,20 @@ impl<B> NearestNeighbour<B> {
 }
 
 impl<B: Clone> NearestNeighbour<B> {
-    fn predict<const N: usize, F>(&mut self, filter: &F, dt: f64)
-    where
-        F: Filter<N, Belief = B> + ?Sized,
-    {
-        let survival = self.config.survival.powf(dt);
-        let mut beliefs: Vec<&mut B> = Vec::with_capacity(self.tracks.len());
-        for track in &mut self.tracks {
-            track.existence *= survival;
-            beliefs.push(&mut track.belief);
-        }
-        filter.predict_all(&mut beliefs, dt);
-    }
-
     /// Lists the pairs within the gate and their costs, and assigns.
     fn assign<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { index, near, solver, pairs, misses, detection, columns } = &mut self.scratch;
+        let Scratch { vicinity, solver, pairs, misses, detection, columns } = &mut self.scratch;
         pairs.clear();
         misses.clear();
         detection.clear();
-        for (row, track) in self.tracks.iter().enumerate() {
-            let reach = filter.reach(&track.belief);
-            let seen = scan.detection.probability(reach.as_ref().map(|(centre, _)| centre));
+        for (row, track) in self.objects.tracks.iter().enumerate() {
+            let (seen, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
             detection.push(seen);
             misses.push(-(1.0 - track.existence * seen).max(f64::MIN_POSITIVE).ln());
-            match reach {
-                _ if seen == 0.0 => near.clear(),
-                Some((centre, spread)) => index.near(&centre, &spread, self.config.gate.search_limit(), near),
-                None => near.splice(.., 0..scan.measurements.len()).for_each(drop),
-            }
-            for &column in near.iter() {
+            for &column in near {
                 // A pair that cannot be compared numerically is a pair outside the gate.
                 let Ok(innovation) = filter.innovation(&track.belief, &scan.measurements[column]) else {
                     continue;
@@ -171,7 +146,7 @@ impl<B: Clone> NearestNeighbour<B> {
         match solver.solve_sparse(pairs, scan.measurements.len(), misses) {
             Ok(best) => columns.extend_from_slice(&best.columns),
             // All costs are finite and every track may stay alone, so there is always an answer.
-            Err(_) => columns.resize(self.tracks.len(), None),
+            Err(_) => columns.resize(self.objects.tracks.len(), None),
         }
     }
 
@@ -180,9 +155,9 @@ impl<B: Clone> NearestNeighbour<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        self.uses.clear();
-        self.uses.resize(scan.measurements.len(), Use::Clutter);
-        for (row, track) in self.tracks.iter_mut().enumerate() {
+        self.objects.clear_uses(scan.measurements.len());
+        let Individuals { tracks, uses, .. } = &mut self.objects;
+        for (row, track) in tracks.iter_mut().enumerate() {
             let (seen, r) = (self.scratch.detection[row], track.existence);
             let number = self.scratch.columns[row];
             let paired = number.and_then(|number| {
@@ -196,7 +171,7 @@ impl<B: Clone> NearestNeighbour<B> {
                     let l = 1.0 - seen + seen * ratio;
                     track.existence = r * l / (1.0 - r + r * l);
                     track.hit(number, scan.time);
-                    self.uses[number] = Use::Updated(track.id);
+                    uses[number] = Use::Updated(track.id);
                 }
                 None if seen > 0.0 => {
                     track.existence = r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
@@ -205,53 +180,6 @@ impl<B: Clone> NearestNeighbour<B> {
                 None => track.unseen(),
             }
             self.config.management.judge(track, scan.time);
-        }
-    }
-
-    /// Drops tracks that have become the same as a stronger one.
-    fn merge<const N: usize, F>(&mut self, filter: &F)
-    where
-        F: Filter<N, Belief = B> + ?Sized,
-    {
-        if self.config.merge <= 0.0 {
-            return;
-        }
-        let Scratch { index, near, .. } = &mut self.scratch;
-        let states: Vec<_> = self.tracks.iter().map(|track| plane(&filter.state(&track.belief))).collect();
-        index.build(&states.iter().map(|state| state.map(|state| state.0)).collect::<Vec<_>>());
-        for (row, state) in states.iter().enumerate() {
-            let Some((centre, spread)) = state else { continue };
-            index.near(centre, spread, self.config.merge, near);
-            for &other in near.iter().filter(|&&other| other != row) {
-                let (track, rival) = (&self.tracks[row], &self.tracks[other]);
-                let alive = track.status != Status::Deleted && rival.status != Status::Deleted;
-                let stronger = (track.confirmed, track.existence, rival.id)
-                    > (rival.confirmed, rival.existence, track.id);
-                let limit = self.config.merge;
-                if alive && stronger && filter.distance(&track.belief, &rival.belief, limit) <= limit {
-                    self.tracks[other].status = Status::Deleted;
-                }
-            }
-        }
-    }
-
-    /// Starts a tentative track at each measurement that no track took.
-    fn birth<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
-    where
-        F: Filter<N, Belief = B> + ?Sized,
-    {
-        for (number, measurement) in scan.measurements.iter().enumerate() {
-            let existence = birth_weight(self.config.birth, filter, scan, measurement);
-            if self.uses[number] != Use::Clutter || existence < self.config.management.min_existence {
-                continue;
-            }
-            // A measurement that cannot say where an object is starts none.
-            let Ok(belief) = filter.birth(measurement) else { continue };
-            let mut track = Track::new(self.next, belief, existence, number, scan.time);
-            self.config.management.judge(&mut track, scan.time);
-            self.uses[number] = Use::Started(track.id);
-            self.next += 1;
-            self.tracks.push(track);
         }
     }
 }
@@ -269,23 +197,22 @@ impl<B: Clone> Tracker for NearestNeighbour<B> {
     {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.tracks.retain(|track| track.status != Status::Deleted);
-        self.scratch.index.build(&places);
-        self.predict(filter, dt);
+        self.scratch.vicinity.build(&places);
+        self.objects.predict(filter, dt, self.config.survival);
         self.assign(filter, scan);
         self.update(filter, scan);
-        self.merge(filter);
-        self.birth(filter, scan);
+        self.objects.drop_doubles(filter, self.config.merge);
+        self.objects.birth(filter, scan, self.config.birth, &self.config.management, |_| 1.0);
         self.time = Some(scan.time);
         Ok(())
     }
 
     fn tracks(&self) -> &[Track<B>] {
-        &self.tracks
+        &self.objects.tracks
     }
 
     fn uses(&self) -> &[Use] {
-        &self.uses
+        &self.objects.uses
     }
 
     fn time(&self) -> Option<f64> {

@@ -1,12 +1,14 @@
 //! Gaussian-mixture probability hypothesis density tracker.
 
-use crate::association::{Gate, PlaceIndex};
+use crate::association::Gate;
 use crate::error::FilterError;
 use crate::filter::Filter;
 
+use super::labels::{Label, Labelled, Roster};
+use super::mixture::{Reduction, Term};
+use super::vicinity::Vicinity;
 use super::{
-    Management, Scan, Status, Track, TrackId, Tracker, TrackerError, Use, birth_weight, error, ln_clutter_at,
-    places, plane, ratio,
+    Management, Scan, Track, Tracker, TrackerError, Use, birth_weight, error, ln_clutter_at, places, ratio,
 };
 
 /// Estimates the intensity of objects over the state space, as a mixture of beliefs, without deciding which measurement
@@ -58,10 +60,8 @@ use super::{
 #[derive(Debug, Clone)]
 pub struct Phd<B> {
     config: PhdConfig,
-    components: Vec<Component<B>>,
-    tracks: Vec<Track<B>>,
-    uses: Vec<Use>,
-    next: TrackId,
+    terms: Vec<Labelled<B>>,
+    roster: Roster<B>,
     time: Option<f64>,
     scratch: Scratch<B>,
 }
@@ -108,27 +108,14 @@ impl Default for PhdConfig {
     }
 }
 
-/// One term of the mixture.
-#[derive(Debug, Clone)]
-struct Component<B> {
-    weight: f64,
-    label: TrackId,
-    belief: B,
-    /// The measurement of this scan that updated it.
-    measurement: Option<usize>,
-    /// Whether the sensor could have seen it.
-    in_view: bool,
-}
-
 /// Buffers that keep their memory from scan to scan.
 #[derive(Debug, Clone)]
 struct Scratch<B> {
-    index: PlaceIndex,
-    near: Vec<usize>,
-    children: Vec<Component<B>>,
+    vicinity: Vicinity,
+    reduction: Reduction<B, Label>,
+    children: Vec<Labelled<B>>,
     /// Sum of the detection terms of each measurement, then its whole denominator, relative to its clutter.
     explained: Vec<f64>,
-    taken: Vec<bool>,
 }
 
 impl<B> Phd<B> {
@@ -142,32 +129,17 @@ impl<B> Phd<B> {
         FilterError::probability("pruning weight", config.prune)?;
         FilterError::positive("extraction weight", config.extract)?;
         let scratch = Scratch {
-            index: PlaceIndex::default(),
-            near: Vec::new(),
+            vicinity: Vicinity::default(),
+            reduction: Reduction::default(),
             children: Vec::new(),
             explained: Vec::new(),
-            taken: Vec::new(),
         };
-        Ok(Phd {
-            config,
-            components: Vec::new(),
-            tracks: Vec::new(),
-            uses: Vec::new(),
-            next: 1,
-            time: None,
-            scratch,
-        })
+        Ok(Phd { config, terms: Vec::new(), roster: Roster::default(), time: None, scratch })
     }
 
     /// Expected number of objects: the sum of the weights.
     pub fn expected_objects(&self) -> f64 {
-        self.components.iter().map(|component| component.weight).sum()
-    }
-
-    fn fresh_label(next: &mut TrackId) -> TrackId {
-        let label = *next;
-        *next += 1;
-        label
+        self.terms.iter().map(|term| term.weight).sum()
     }
 }
 
@@ -177,34 +149,28 @@ impl<B: Clone> Phd<B> {
         F: Filter<N, Belief = B> + ?Sized,
     {
         let survival = self.config.survival.powf(dt);
-        let mut beliefs: Vec<&mut B> = Vec::with_capacity(self.components.len());
-        for component in &mut self.components {
-            component.weight *= survival;
-            beliefs.push(&mut component.belief);
+        let mut beliefs: Vec<&mut B> = Vec::with_capacity(self.terms.len());
+        for term in &mut self.terms {
+            term.weight *= survival;
+            beliefs.push(&mut term.belief);
         }
         filter.predict_all(&mut beliefs, dt);
     }
 
-    /// Replaces the predicted components by the missed and the detected ones, weighted and pruned.
+    /// Replaces the predicted terms by the missed and the detected ones, weighted and pruned.
     fn update<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { index, near, children, explained, .. } = &mut self.scratch;
+        let Scratch { vicinity, children, explained, .. } = &mut self.scratch;
         children.clear();
         explained.clear();
         explained.resize(scan.measurements.len(), 0.0);
-        for component in &mut self.components {
-            let reach = filter.reach(&component.belief);
-            let detection = scan.detection.probability(reach.as_ref().map(|(centre, _)| centre));
-            component.in_view = detection > 0.0;
-            component.measurement = None;
-            match reach {
-                Some((centre, spread)) => index.near(&centre, &spread, self.config.gate.search_limit(), near),
-                None => near.splice(.., 0..scan.measurements.len()).for_each(drop),
-            }
-            for &number in near.iter().filter(|_| component.in_view) {
-                let mut belief = component.belief.clone();
+        for term in &mut self.terms {
+            let (detection, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
+            term.tag = Label { id: term.tag.id, measurement: None, in_view: detection > 0.0 };
+            for &number in near {
+                let mut belief = term.belief.clone();
                 // A pair whose update fails numerically is a pair outside the gate.
                 let Ok(innovation) = filter.update(&mut belief, &scan.measurements[number]) else { continue };
                 if !self.config.gate.contains(&innovation) {
@@ -212,142 +178,56 @@ impl<B: Clone> Phd<B> {
                 }
                 let ln_ratio =
                     innovation.log_likelihood - ln_clutter_at(filter, scan, &scan.measurements[number]);
-                let weight = detection * component.weight * ratio(ln_ratio);
+                let weight = detection * term.weight * ratio(ln_ratio);
                 explained[number] += weight;
-                let (label, measurement) = (component.label, Some(number));
-                children.push(Component { weight, label, belief, measurement, in_view: true });
+                let tag = Label { measurement: Some(number), ..term.tag };
+                children.push(Term { weight, belief, tag });
             }
-            component.weight *= 1.0 - detection;
+            term.weight *= 1.0 - detection;
         }
         // Everything is relative to the clutter at the measurement, whose own share is then one.
         explained.iter_mut().for_each(|sum| *sum += 1.0);
-        self.components.append(children);
-        for component in &mut self.components {
-            if let Some(number) = component.measurement {
-                component.weight /= explained[number];
+        self.terms.append(children);
+        for term in &mut self.terms {
+            if let Some(number) = term.tag.measurement {
+                term.weight /= explained[number];
             }
         }
-        self.components.retain(|component| component.weight > self.config.prune);
+        self.terms.retain(|term| term.weight > self.config.prune);
     }
 
-    /// Merges components that are near each other, heaviest first, and keeps the heaviest of the result.
-    fn reduce<const N: usize, F>(&mut self, filter: &F)
+    /// Reads the tracks off the terms. A label that management gave up takes its terms with it.
+    fn label<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        // The sort is stable and weights that tie keep their order, so the result does not depend on the platform.
-        self.components.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        let Scratch { index, near, children, taken, .. } = &mut self.scratch;
-        let components = &self.components;
-        let states: Vec<_> =
-            components.iter().map(|component| plane(&filter.state(&component.belief))).collect();
-        index.build(&states.iter().map(|state| state.map(|s| s.0)).collect::<Vec<_>>());
-        taken.clear();
-        taken.resize(components.len(), false);
-        children.clear();
-        for (heaviest, component) in components.iter().enumerate() {
-            if taken[heaviest] {
-                continue;
-            }
-            let mut merged = component.clone();
-            match &states[heaviest] {
-                Some((centre, spread)) => index.near(centre, spread, self.config.merge, near),
-                None => near.splice(.., 0..components.len()).for_each(drop),
-            }
-            for &other in near.iter().filter(|&&other| other > heaviest) {
-                let part = &components[other];
-                let close = !taken[other]
-                    && filter.distance(&component.belief, &part.belief, self.config.merge)
-                        <= self.config.merge;
-                if close {
-                    taken[other] = true;
-                    filter.merge(&mut merged.belief, merged.weight, &part.belief, part.weight);
-                    merged.weight += part.weight;
-                }
-            }
-            children.push(merged);
-        }
-        children.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        children.truncate(self.config.cap);
-        std::mem::swap(&mut self.components, children);
+        let rule = (self.config.extract, scan.time, &self.config.management);
+        self.roster.read(filter, &mut self.terms, scan.measurements.len(), rule);
+        let roster = &self.roster;
+        self.terms.retain(|term| roster.lives(term.tag.id));
     }
 
-    /// Reads the tracks off the labelled components, heaviest first.
-    fn label(&mut self, time: f64) {
-        for track in &mut self.tracks {
-            track.existence = 0.0;
-            track.measurement = None;
-        }
-        for component in &mut self.components {
-            let position = self.tracks.binary_search_by_key(&component.label, |track| track.id);
-            let heaviest = position.is_ok_and(|at| self.tracks[at].existence == 0.0);
-            match position {
-                // The first component of a label is its heaviest.
-                Ok(at) if heaviest => show(&mut self.tracks[at], component, self.config.extract, time),
-                Ok(at) if component.weight < self.config.extract => {
-                    let track = &mut self.tracks[at];
-                    track.existence = (track.existence + component.weight).min(1.0);
-                }
-                _ => {
-                    component.label = Phd::<B>::fresh_label(&mut self.next);
-                    let (belief, number) = (component.belief.clone(), component.measurement);
-                    let existence = component.weight.min(1.0);
-                    let mut track =
-                        Track::new(component.label, belief, existence, number.unwrap_or_default(), time);
-                    track.measurement = number;
-                    self.tracks.push(track);
-                }
-            }
-        }
-        for track in &mut self.tracks {
-            self.config.management.judge(track, time);
-        }
-        // A label that management gave up takes its components with it.
-        let tracks = &self.tracks;
-        self.components.retain(|component| {
-            let at = tracks.binary_search_by_key(&component.label, |track| track.id);
-            at.is_ok_and(|at| tracks[at].status != Status::Deleted)
-        });
-    }
-
-    /// Starts a component at each measurement that is not explained, for the next scan to confirm.
+    /// Starts a term at each measurement that is not explained, for the next scan to confirm.
     fn birth<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        self.uses.clear();
-        self.uses.resize(scan.measurements.len(), Use::Clutter);
-        for track in self.tracks.iter().rev() {
-            if let Some(number) = track.measurement {
-                self.uses[number] = Use::Updated(track.id);
-            }
-        }
         for (number, measurement) in scan.measurements.iter().enumerate() {
             let unexplained = 1.0 / self.scratch.explained[number];
             let weight = birth_weight(self.config.birth, filter, scan, measurement) * unexplained;
-            if weight <= self.config.prune || unexplained < 0.1 {
+            if weight <= self.config.prune || unexplained < LEAST_UNEXPLAINED {
                 continue;
             }
             // A measurement that cannot say where an object is starts none.
             let Ok(belief) = filter.birth(measurement) else { continue };
-            let label = Phd::<B>::fresh_label(&mut self.next);
-            self.uses[number] = Use::Started(label);
-            self.tracks.push(Track::new(label, belief.clone(), weight, number, scan.time));
-            self.components.push(Component { weight, label, belief, measurement: None, in_view: false });
+            let id = self.roster.start(&belief, weight, number, scan.time);
+            self.terms.push(Term { weight, belief, tag: Label { id, measurement: None, in_view: false } });
         }
     }
 }
 
-/// Updates a track from the heaviest component of its label. A light component is no sighting, whatever updated it.
-fn show<B: Clone>(track: &mut Track<B>, component: &Component<B>, extract: f64, time: f64) {
-    track.existence = component.weight.min(1.0);
-    track.belief = component.belief.clone();
-    match component.measurement {
-        Some(number) if component.weight >= extract => track.hit(number, time),
-        _ if component.in_view => track.miss(),
-        _ => track.unseen(),
-    }
-}
+/// A measurement that is explained by more than the rest of this starts nothing.
+pub(super) const LEAST_UNEXPLAINED: f64 = 0.1;
 
 impl<B: Clone> Tracker for Phd<B> {
     type Belief = B;
@@ -362,23 +242,24 @@ impl<B: Clone> Tracker for Phd<B> {
     {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.tracks.retain(|track| track.status != Status::Deleted);
-        self.scratch.index.build(&places);
+        self.roster.begin();
+        self.scratch.vicinity.build(&places);
         self.predict(filter, dt);
         self.update(filter, scan);
-        self.reduce(filter);
-        self.label(scan.time);
+        let (merge, cap) = (self.config.merge, self.config.cap);
+        self.scratch.reduction.reduce(filter, &mut self.terms, merge, cap);
+        self.label(filter, scan);
         self.birth(filter, scan);
         self.time = Some(scan.time);
         Ok(())
     }
 
     fn tracks(&self) -> &[Track<B>] {
-        &self.tracks
+        &self.roster.tracks
     }
 
     fn uses(&self) -> &[Use] {
-        &self.uses
+        &self.roster.uses
     }
 
     fn time(&self) -> Option<f64> {

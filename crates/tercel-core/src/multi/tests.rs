@@ -242,6 +242,9 @@ every_tracker!(
     NearestNeighbour::<Gaussian<4>>::new(NearestNeighbourConfig::default()).unwrap()
 );
 every_tracker!(phd, Phd::<Gaussian<4>>::new(PhdConfig::default()).unwrap());
+every_tracker!(multi_bernoulli, MultiBernoulli::<Gaussian<4>>::new(MultiBernoulliConfig::default()).unwrap());
+every_tracker!(jpda, Jpda::<Gaussian<4>>::new(JpdaConfig::default()).unwrap());
+every_tracker!(pmbm, Pmbm::<Gaussian<4>>::new(PmbmConfig::default()).unwrap());
 
 #[test]
 fn the_weights_of_the_phd_count_the_objects() {
@@ -259,6 +262,49 @@ fn the_weights_of_the_phd_count_the_objects() {
     assert!((sum - 3.5).abs() < 0.4, "{sum}");
 }
 
+#[test]
+fn the_number_of_objects_of_the_multi_bernoulli_has_no_bias() {
+    let (filter, scene) = (filter(), scene());
+    // Births add their own expectation; these add a hundredth of an object.
+    let config = MultiBernoulliConfig { birth: 1e-3, prune: 1e-5, ..MultiBernoulliConfig::default() };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for run in 0..200 {
+        let mut random = ChaCha8Rng::seed_from_u64(1000 + run);
+        let mut tracker = MultiBernoulli::<Gaussian<4>>::new(config).unwrap();
+        for step in 0..25 {
+            let plots = plots(&CROSSING, f64::from(step), 0.95, 10, &mut random);
+            tracker.step(&filter, &scan(f64::from(step), &plots, &scene)).unwrap();
+            if step >= 15 {
+                sum += tracker.expected_objects();
+                count += 1.0;
+            }
+        }
+    }
+    let bias = sum / count - 3.0;
+    assert!(bias.abs() < 0.1, "{bias}");
+}
+
+#[test]
+fn an_outage_is_survived_by_memory_and_a_thousand_births_a_scan_by_the_caps() {
+    let (filter, scene, mut random) = (filter(), scene(), ChaCha8Rng::seed_from_u64(8));
+    let config = PmbmConfig { cap: 300, ..PmbmConfig::default() };
+    let mut pmbm = Pmbm::<Gaussian<4>>::new(config).unwrap();
+    let mut member =
+        MultiBernoulli::<Gaussian<4>>::new(MultiBernoulliConfig { cap: 300, ..Default::default() }).unwrap();
+    for step in 0..45 {
+        let seen = step < 10 || step >= 40;
+        let plots =
+            if seen { plots(&CROSSING, f64::from(step), 0.95, 1000, &mut random) } else { Plots::new() };
+        pmbm.step(&filter, &scan(f64::from(step), &plots, &scene)).unwrap();
+        member.step(&filter, &scan(f64::from(step), &plots, &scene)).unwrap();
+        let alive =
+            |tracks: &[Track<Gaussian<4>>]| tracks.iter().filter(|t| t.status != Status::Deleted).count();
+        assert!(alive(pmbm.tracks()) <= 300);
+        // Those that this scan starts wait for the next one.
+        assert!(alive(member.tracks()) <= 300 + 1003);
+    }
+}
+
 proptest! {
     #[test]
     fn any_scans_leave_finite_tracks(
@@ -268,13 +314,20 @@ proptest! {
         let (filter, scene) = (filter(), scene());
         let mut nearest = NearestNeighbour::<Gaussian<4>>::new(NearestNeighbourConfig::default()).unwrap();
         let mut phd = Phd::<Gaussian<4>>::new(PhdConfig::default()).unwrap();
+        let mut member = MultiBernoulli::<Gaussian<4>>::new(MultiBernoulliConfig::default()).unwrap();
+        let mut jpda = Jpda::<Gaussian<4>>::new(JpdaConfig::default()).unwrap();
+        let mut pmbm = Pmbm::<Gaussian<4>>::new(PmbmConfig::default()).unwrap();
         let mut time = 0.0;
         for (dt, places) in scans {
             time += dt;
             let plots: Plots = places.into_iter().map(|(x, y)| [x, y].into()).collect();
             nearest.step(&filter, &scan(time, &plots, &scene)).unwrap();
             phd.step(&filter, &scan(time, &plots, &scene)).unwrap();
-            let all = nearest.tracks().iter().chain(phd.tracks());
+            member.step(&filter, &scan(time, &plots, &scene)).unwrap();
+            jpda.step(&filter, &scan(time, &plots, &scene)).unwrap();
+            pmbm.step(&filter, &scan(time, &plots, &scene)).unwrap();
+            let all = nearest.tracks().iter().chain(phd.tracks()).chain(member.tracks());
+            let all = all.chain(jpda.tracks()).chain(pmbm.tracks());
             for track in all {
                 prop_assert!(track.belief.mean.iter().all(|x| x.is_finite()));
                 prop_assert!((0.0..=1.0).contains(&track.existence));

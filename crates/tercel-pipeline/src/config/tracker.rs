@@ -16,6 +16,12 @@ pub enum TrackerConfig {
     NearestNeighbour(NearestNeighbourConfig),
     /// The intensity of objects is estimated, without deciding which detection is whose.
     Phd(PhdConfig),
+    /// The set of objects is estimated, each with a probability of existence, without deciding which detection is whose.
+    MultiBernoulli(MultiBernoulliConfig),
+    /// Each track takes all detections near it, by their joint probabilities.
+    Jpda(JpdaConfig),
+    /// The most probable hypotheses on which detection is whose are kept.
+    Pmbm(PmbmConfig),
 }
 
 impl Default for TrackerConfig {
@@ -130,6 +136,183 @@ impl PhdConfig {
             merge: self.merge.get(),
             cap: self.cap.get() as usize,
             extract: self.extract.get(),
+            management: self.management.build(),
+        })
+    }
+}
+
+/// Settings of the multi-Bernoulli tracker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MultiBernoulliConfig {
+    /// Probability that an object's own detection falls inside the gate of its belief; above 0, below 1.
+    #[schemars(extend("x-unit" = "1"))]
+    pub gate: Probability,
+    /// Probability that an object survives one second.
+    #[schemars(extend("x-unit" = "1"))]
+    pub survival: Probability,
+    /// Probability that an unexplained detection comes from a new object, where clutter is at its background level.
+    #[schemars(extend("x-unit" = "1"))]
+    pub birth: Probability,
+    /// Objects of lower existence are dropped.
+    #[schemars(extend("x-unit" = "1"))]
+    pub prune: Probability,
+    /// Beliefs of one object closer than this squared Mahalanobis distance are merged.
+    #[schemars(extend("x-unit" = "1"))]
+    pub merge: NonNegative,
+    /// Largest number of objects.
+    #[schemars(extend("x-unit" = "1"))]
+    pub cap: Count,
+    /// Largest number of beliefs of an object.
+    #[schemars(extend("x-unit" = "1"))]
+    pub beliefs: Count,
+    /// Existence above which an object counts as seen.
+    #[schemars(extend("x-unit" = "1"))]
+    pub extract: Positive,
+    /// When tracks are confirmed and given up.
+    pub management: ManagementConfig,
+}
+
+impl Default for MultiBernoulliConfig {
+    fn default() -> Self {
+        let phd = PhdConfig::default();
+        MultiBernoulliConfig {
+            gate: phd.gate,
+            survival: phd.survival,
+            birth: phd.birth,
+            prune: Probability::constant(1e-3),
+            merge: phd.merge,
+            cap: phd.cap,
+            beliefs: Count::constant(20),
+            extract: phd.extract,
+            management: phd.management,
+        }
+    }
+}
+
+impl MultiBernoulliConfig {
+    pub(crate) fn build(&self) -> Result<multi::MultiBernoulliConfig, FilterError> {
+        Ok(multi::MultiBernoulliConfig {
+            gate: Gate::new(self.gate.get())?,
+            survival: self.survival.get(),
+            birth: self.birth.get(),
+            prune: self.prune.get(),
+            merge: self.merge.get(),
+            cap: self.cap.get() as usize,
+            beliefs: self.beliefs.get() as usize,
+            extract: self.extract.get(),
+            management: self.management.build(),
+        })
+    }
+}
+
+/// Settings of the joint probabilistic data association tracker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct JpdaConfig {
+    /// Probability that an object's own detection falls inside its gate; above 0, below 1.
+    #[schemars(extend("x-unit" = "1"))]
+    pub gate: Probability,
+    /// Probability that an object survives one second.
+    #[schemars(extend("x-unit" = "1"))]
+    pub survival: Probability,
+    /// Probability that a detection that no track claims comes from a new object, where clutter is at its background level.
+    #[schemars(extend("x-unit" = "1"))]
+    pub birth: Probability,
+    /// Of two tracks closer than this squared Mahalanobis distance the weaker is dropped; 0 keeps both.
+    #[schemars(extend("x-unit" = "1"))]
+    pub merge: NonNegative,
+    /// When tracks are confirmed and given up.
+    pub management: ManagementConfig,
+}
+
+impl Default for JpdaConfig {
+    fn default() -> Self {
+        let nearest = NearestNeighbourConfig::default();
+        JpdaConfig {
+            gate: nearest.gate,
+            survival: nearest.survival,
+            birth: nearest.birth,
+            merge: nearest.merge,
+            management: nearest.management,
+        }
+    }
+}
+
+impl JpdaConfig {
+    pub(crate) fn build(&self) -> Result<multi::JpdaConfig, FilterError> {
+        Ok(multi::JpdaConfig {
+            gate: Gate::new(self.gate.get())?,
+            survival: self.survival.get(),
+            birth: self.birth.get(),
+            merge: self.merge.get(),
+            management: self.management.build(),
+        })
+    }
+}
+
+/// Settings of the Poisson multi-Bernoulli mixture tracker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PmbmConfig {
+    /// Probability that an object's own detection falls inside its gate; above 0, below 1.
+    #[schemars(extend("x-unit" = "1"))]
+    pub gate: Probability,
+    /// Probability that an object survives one second.
+    #[schemars(extend("x-unit" = "1"))]
+    pub survival: Probability,
+    /// Expected objects per area before the first scan.
+    #[schemars(extend("x-unit" = "1/m^2"))]
+    pub undetected: NonNegative,
+    /// Expected new objects per area and time.
+    #[schemars(extend("x-unit" = "1/(m^2 s)"))]
+    pub birth: NonNegative,
+    /// Largest number of hypotheses about objects that compete for detections.
+    #[schemars(extend("x-unit" = "1"))]
+    pub hypotheses: Count,
+    /// Hypotheses of a lower weight are dropped.
+    #[schemars(extend("x-unit" = "1"))]
+    pub prune: Probability,
+    /// Versions of a track with the same last detection and closer than this squared Mahalanobis distance are merged; 0 keeps all.
+    #[schemars(extend("x-unit" = "1"))]
+    pub merge: NonNegative,
+    /// Largest number of tracks.
+    #[schemars(extend("x-unit" = "1"))]
+    pub cap: Count,
+    /// When tracks are confirmed and given up.
+    pub management: ManagementConfig,
+}
+
+impl Default for PmbmConfig {
+    fn default() -> Self {
+        PmbmConfig {
+            gate: Probability::constant(0.999),
+            survival: Probability::constant(0.99),
+            undetected: NonNegative::constant(1e-6),
+            birth: NonNegative::constant(1e-8),
+            hypotheses: Count::constant(100),
+            prune: Probability::constant(1e-4),
+            merge: NonNegative::constant(0.5),
+            cap: Count::constant(1000),
+            management: ManagementConfig {
+                min_existence: Probability::constant(1e-4),
+                ..ManagementConfig::default()
+            },
+        }
+    }
+}
+
+impl PmbmConfig {
+    pub(crate) fn build(&self) -> Result<multi::PmbmConfig, FilterError> {
+        Ok(multi::PmbmConfig {
+            gate: Gate::new(self.gate.get())?,
+            survival: self.survival.get(),
+            undetected: self.undetected.get(),
+            birth: self.birth.get(),
+            hypotheses: self.hypotheses.get() as usize,
+            prune: self.prune.get(),
+            merge: self.merge.get(),
+            cap: self.cap.get() as usize,
             management: self.management.build(),
         })
     }

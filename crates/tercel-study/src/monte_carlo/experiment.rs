@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use tercel_core::error::FilterError;
 use tercel_data::table::{Detections, Tracks, Truths};
 
-use super::Plan;
+use super::{Plan, Results};
 use crate::StudyError;
 use crate::report::{Picture, Section};
 
@@ -28,6 +27,11 @@ pub trait Experiment: Sync {
 
     /// What the report says besides figures and curves.
     fn sections(&self) -> Vec<Section> {
+        Vec::new()
+    }
+
+    /// What the report says that follows from all results together.
+    fn conclusions(&self, _results: &Results) -> Vec<Section> {
         Vec::new()
     }
 
@@ -77,9 +81,9 @@ pub struct Example {
 
 impl Attempt {
     /// Takes the time of `work`, and then scores its answer.
-    pub fn of<T>(
+    pub fn of<T, E: std::fmt::Display>(
         steps: u64,
-        work: impl FnOnce() -> Result<T, FilterError>,
+        work: impl FnOnce() -> Result<T, E>,
         score: impl FnOnce(T) -> Result<Outcome, String>,
     ) -> Self {
         let start = Instant::now();

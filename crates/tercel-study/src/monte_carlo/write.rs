@@ -114,7 +114,7 @@ impl Results {
             });
             report = report.with(chart);
         }
-        for section in experiment.sections() {
+        for section in experiment.sections().into_iter().chain(experiment.conclusions(self)) {
             report = report.with(section);
         }
         match example {

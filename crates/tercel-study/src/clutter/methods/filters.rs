@@ -1,0 +1,77 @@
+//! The filters that the methods put into trackers.
+
+use nalgebra::{Matrix4, Vector4};
+use tercel_core::belief::Gaussian;
+use tercel_core::error::FilterError;
+use tercel_core::filter::{Imm, Kalman, Transition};
+use tercel_core::motion::{ConstantVelocity, LinearMotion, Motion, Turn};
+use tercel_core::sensor::Position;
+use tercel_sim::clutter::Sensor;
+
+/// Standard deviation of a new object's velocity, m/s per axis.
+const SPEED: f64 = 20.0;
+
+/// Spectral density of the one straight motion, m²/s³.
+const STRAIGHT: f64 = 8.0;
+
+/// Turn rates (degrees per second) and spectral densities (m²/s³) of our bank.
+const BANK: [(f64, f64); 6] =
+    [(0.0, 0.05), (5.0, 0.16), (-5.0, 0.16), (10.0, 0.16), (-10.0, 0.16), (0.0, 4.0)];
+
+/// Probability of keeping the mode over a second.
+const STAY: f64 = 0.95;
+
+pub(super) fn straight(sensor: &Sensor) -> Result<Kalman<ConstantVelocity, Position<2>>, FilterError> {
+    let motion = ConstantVelocity::new(STRAIGHT).with_speed(SPEED);
+    Ok(Kalman::new(motion, Position::new(sensor.deviation)?))
+}
+
+/// Ours: the modes of [`BANK`]; it is not told what the scenes hold.
+pub(super) fn bank(sensor: &Sensor) -> Result<Imm<Kalman<Turn, Position<2>>>, FilterError> {
+    let radar = Position::new(sensor.deviation)?;
+    let mode = |(rate, density): (f64, f64)| {
+        Kalman::new(Turn::new(rate.to_radians(), density).with_speed(SPEED), radar)
+    };
+    Imm::new(BANK.map(mode), Transition::sticky(STAY).per(1.0))
+}
+
+/// The published modes: straight, a turn to the left at 10 °/s, the acceleration of the second scene, with the published
+/// noise and the transitions of the second scene.
+pub(super) fn published(sensor: &Sensor) -> Result<Imm<Kalman<Printed, Position<2>>>, FilterError> {
+    let radar = Position::new(sensor.deviation)?;
+    let modes = [(0.0, 0.0), (10.0_f64.to_radians(), 0.0), (0.0, 1.0)];
+    let modes = modes.map(|(rate, acceleration)| {
+        Kalman::new(Printed { turn: Turn::new(rate, 0.0).with_speed(SPEED), acceleration }, radar)
+    });
+    let rows = [[0.4, 0.3, 0.3], [0.3, 0.4, 0.3], [0.3, 0.3, 0.4]];
+    Imm::new(modes, Transition::from_rows(rows)?)
+}
+
+/// A turn, pushed by a known acceleration along both axes, with the published noise: variances of 10 m² and 5 m²/s² for each
+/// second.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Printed {
+    turn: Turn,
+    acceleration: f64,
+}
+
+impl Motion<4> for Printed {
+    fn transition(&self, state: &Vector4<f64>, dt: f64) -> Vector4<f64> {
+        let (place, speed) = (0.5 * self.acceleration * dt * dt, self.acceleration * dt);
+        self.turn.transition(state, dt) + Vector4::new(place, place, speed, speed)
+    }
+
+    fn jacobian(&self, state: &Vector4<f64>, dt: f64) -> Matrix4<f64> {
+        self.turn.jacobian(state, dt)
+    }
+
+    fn noise(&self, _: &Vector4<f64>, dt: f64) -> Matrix4<f64> {
+        Matrix4::from_diagonal(&(Vector4::new(10.0, 10.0, 5.0, 5.0) * dt.abs()))
+    }
+
+    fn prior(&self) -> Gaussian<4> {
+        self.turn.prior()
+    }
+}
+
+impl LinearMotion<4> for Printed {}

@@ -1,0 +1,14 @@
+//! The studies of many manoeuvring objects in clutter: methods, and how they are compared on simulated scenes.
+
+mod example;
+mod experiment;
+pub mod methods;
+mod recording;
+mod recovery;
+mod score;
+pub mod tables;
+
+pub use experiment::{ClutterExperiment, SEED};
+pub use recording::{Method, Recording, Reported, Tracked};
+pub use recovery::recovery;
+pub use score::{CUTOFF, METRICS};
