@@ -296,7 +296,7 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
         let state = self.state(belief);
         let parts = || belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
         let total: f64 = belief.probabilities.iter().sum();
-        let share = |((mode, filter), probability): ((&Mode<_, N>, &F), &f64)| {
+        let share = |((mode, filter), probability): ((&Mode<_>, &F), &f64)| {
             Some(filter.estimate(&mode.belief).extent? * (probability / total))
         };
         let extent = parts().map(share).sum::<Option<_>>().filter(|_| !self.filters.is_empty());

@@ -80,14 +80,17 @@ impl<const N: usize, T: Motion<N>> Sampled<N> for JumpMarkov<T> {
         dt: f64,
         random: &mut ChaCha8Rng,
     ) {
-        let count = self.motions.len();
-        let mut room = Vec::new();
-        let transition = self.chain.over(dt, &mut room);
-        let mut noises: Vec<Noise<N>> = (0..count).map(|_| Noise::default()).collect();
+        if dt != 0.0 {
+            self.chain.leap(dt, &mut Vec::new(), |leap| {
+                for mode in memories.iter_mut() {
+                    let value = *mode / leap.stride % leap.modes;
+                    let next = drawn(&leap.probabilities[value * leap.modes..][..leap.modes], random);
+                    *mode = *mode - value * leap.stride + next * leap.stride;
+                }
+            });
+        }
+        let mut noises: Vec<Noise<N>> = self.motions.iter().map(|_| Noise::default()).collect();
         for (state, mode) in states.iter_mut().zip(memories) {
-            if dt != 0.0 {
-                *mode = drawn(&transition[*mode * count..][..count], random);
-            }
             *state = noises[*mode].moved(&self.motions[*mode], state, dt, random);
         }
     }

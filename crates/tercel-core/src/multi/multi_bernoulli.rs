@@ -228,7 +228,7 @@ impl<B: Clone> MultiBernoulli<B> {
     }
 
     /// Adds the measured objects to the legacy ones, and drops what hardly exists.
-    fn collect<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
+    fn collect<const N: usize, F>(&mut self, filter: &F)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
@@ -339,7 +339,7 @@ impl<B: Clone> Tracker for MultiBernoulli<B> {
         self.scratch.vicinity.build(&places);
         self.predict(filter, dt);
         self.contribute(filter, scan);
-        self.collect(filter, scan);
+        self.collect(filter);
         self.label(filter, scan);
         self.birth(filter, scan);
         self.time = Some(scan.time);

@@ -6,7 +6,7 @@ use crate::filter::Filter;
 
 use super::individuals::Individuals;
 use super::vicinity::Vicinity;
-use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutter_at, places};
+use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutter_at, places, ratio};
 
 /// Gives each track at most one measurement and each measurement to at most one track, so that the whole scan is explained
 /// at the least cost, and keeps the probability that each track exists.
