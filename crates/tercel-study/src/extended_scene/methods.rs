@@ -96,7 +96,8 @@ impl Cells {
     fn filter(&self) -> Result<RandomMatrix<ConstantVelocity>, FilterError> {
         let scattering = Scattering::uniform(self.sensor.noise)?;
         let prior = InverseWishart::new(Matrix2::identity() * 36.0, 4.0)?;
-        let filter = RandomMatrix::new(motion(), scattering, prior, Evolution::forget(10.0)?, Rule::Distorted);
+        let filter =
+            RandomMatrix::new(motion(), scattering, prior, Evolution::forget(10.0)?, Rule::Distorted);
         filter.with_rate(Rate::new(self.sensor.points, 3.0)?, 20.0)
     }
 }
@@ -133,7 +134,10 @@ impl Method for Means {
         let filter = Kalman::new(motion(), Position::<2>::new(MEAN)?);
         let tracker = Phd::<Gaussian<4>>::new(PhdConfig::default())?;
         let means = |scan: &Vec<Vector2<f64>>| {
-            distance_partition(scan, DISTANCE).iter().map(|cell: &Points| Measurement::from(cell.mean())).collect()
+            distance_partition(scan, DISTANCE)
+                .iter()
+                .map(|cell: &Points| Measurement::from(cell.mean()))
+                .collect()
         };
         let read = |belief: &Gaussian<4>| Report {
             place: Vector2::new(belief.mean[0], belief.mean[1]),

@@ -40,7 +40,8 @@ pub(super) fn fixed_point<const N: usize, T>(
         let gain = covariance * inverse(&(covariance + inner / n));
         let position = place + gain * (mean - place);
         let offset = mean - position;
-        let uncertain = covariance - gain * covariance + sigma;
+        // P - K P without the difference, which would cancel where the prediction is vague.
+        let uncertain = gain * inner / n + sigma;
         let squares = scatter + (offset * offset.transpose() + uncertain) * n;
         let before = extent.mean();
         extent = belief.extent;
