@@ -1,7 +1,8 @@
-//! Trackers of extended objects on radar recordings without truth: do they survive, and how long do tracks live?
+//! Trackers of extended objects on radar recordings without truth: do they survive, and how long do tracks
+//! live?
 //!
-//! Reads rows `recording,t_s,x_north_m,y_east_m,..` from standard input, as in the recordings of a canal radar in Trondheim:
-//! `zcat ravnkloa.csv.gz | cargo run --release -p tercel-study --example extended_radar`
+//! Reads rows `recording,t_s,x_north_m,y_east_m,..` from standard input, as in the recordings of a canal
+//! radar in Trondheim: `zcat ravnkloa.csv.gz | cargo run --release -p tercel-study --example extended_radar`
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
