@@ -1,5 +1,5 @@
-//! Time of one step of the filters of extended objects with 20 points a scan, and of the comparison of two ellipses:
-//! `cargo bench -p tercel-core --bench extended`.
+//! Time of one step of the filters of extended objects with 20 points a scan, and of the comparison of two
+//! ellipses: `cargo bench -p tercel-core --bench extended`.
 
 #![allow(clippy::unwrap_used)]
 

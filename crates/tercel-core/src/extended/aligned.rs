@@ -13,8 +13,8 @@ use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
 use crate::motion::Motion;
 use crate::sensor::Sensor;
 
-/// Estimates motion and direction of an object of known size whose long axis lies along its velocity, so that the shape of a
-/// scan tells where the object is going.
+/// Estimates motion and direction of an object of known size whose long axis lies along its velocity, so that
+/// the shape of a scan tells where the object is going.
 ///
 /// ## Recursion
 /// ```text
@@ -22,16 +22,16 @@ use crate::sensor::Sensor;
 /// p(θ, r | scan) ∝ N(r u(θ); v, P_v) r · p(Z | θ)          heading θ, speed r > 0, scatter Z
 /// v, P_v ← moments of r u(θ);  the rest of the state follows by regression
 /// ```
-/// The density of heading and speed is integrated numerically, so a slow object whose course is anybody's guess is handled as well
-/// as a fast one.
+/// The density of heading and speed is integrated numerically, so a slow object whose course is anybody's
+/// guess is handled as well as a fast one.
 ///
 /// ## Use it when
-/// road vehicles, ships under way and aircraft in calm air are seen, and their type is known. An object that slides, drifts or reverses
-/// its extent breaks the assumption; use [`KnownSize`](super::KnownSize) then.
+/// road vehicles, ships under way and aircraft in calm air are seen, and their type is known. An object that
+/// slides, drifts or reverses its extent breaks the assumption; use [`KnownSize`](super::KnownSize) then.
 ///
 /// ## Reference
-/// Own formulation; the tie between velocity and extent is that of trajectory-aligned random matrices (Sahin, Balci and Özkan
-/// (2024)).
+/// Own formulation; the tie between velocity and extent is that of trajectory-aligned random matrices (Sahin,
+/// Balci and Özkan (2024)).
 ///
 /// ```
 /// use nalgebra::{Matrix2, vector};

@@ -10,25 +10,26 @@ use crate::error::FilterError;
 use crate::filter::{Estimate, Filter, Innovation};
 use crate::motion::AutoRegression;
 
-/// Estimates an object of known size that points where it goes, and the weights with which its velocity depends on the last `B`
-/// velocities.
+/// Estimates an object of known size that points where it goes, and the weights with which its velocity
+/// depends on the last `B` velocities.
 ///
 /// ## Recursion
 /// State, angle and scan as in [`Aligned`](super::Aligned), with the motion of
-/// [`AutoRegressive`](crate::motion::AutoRegressive) under the weights `a` that are believed so far. After each step `k`, for each
-/// axis with `φ = (v(k-1), .., v(k-B))` and `v(k)` from the state:
+/// [`AutoRegressive`](crate::motion::AutoRegressive) under the weights `a` that are believed so far. After
+/// each step `k`, for each axis with `φ = (v(k-1), .., v(k-B))` and `v(k)` from the state:
 /// ```text
 /// g = A φ / (σ² + φᵀ A φ),    a ← a + g (v(k) - φᵀ a),    A ← (A - g φᵀ A) / f
 /// ```
-/// recursive least squares with the forgetting factor `f`. What the weights leave open adds `φᵀ A φ` to the variance of the next
-/// velocity.
+/// recursive least squares with the forgetting factor `f`. What the weights leave open adds `φᵀ A φ` to the
+/// variance of the next velocity.
 ///
 /// ## Use it when
-/// an object repeats patterns that no model was written for, and stays in view for some ten times `B` scans. `N` is `2 + 2 B`.
+/// an object repeats patterns that no model was written for, and stays in view for some ten times `B` scans.
+/// `N` is `2 + 2 B`.
 ///
 /// ## Reference
-/// Ljung and Söderström (1983), algorithm of section 2.2.1, on estimated instead of measured velocities; own combination with the
-/// aligned extent.
+/// Ljung and Söderström (1983), algorithm of section 2.2.1, on estimated instead of measured velocities; own
+/// combination with the aligned extent.
 ///
 /// ```
 /// use nalgebra::{Matrix2, vector};
@@ -67,8 +68,9 @@ pub struct Identified<const N: usize, const B: usize> {
 }
 
 impl<const B: usize> AlignedAutoRegressive<B> {
-    /// A filter of objects with these semi-axes (m), for scans every `interval` seconds, with this standard deviation (m/s per axis) of
-    /// what the weights do not explain of a velocity. At first the velocity is believed to stay as it is.
+    /// A filter of objects with these semi-axes (m), for scans every `interval` seconds, with this standard
+    /// deviation (m/s per axis) of what the weights do not explain of a velocity. At first the velocity is
+    /// believed to stay as it is.
     ///
     /// # Errors
     /// When an axis, the interval or the deviation is not positive.

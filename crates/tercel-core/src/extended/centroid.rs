@@ -20,10 +20,12 @@ use crate::sensor::Sensor;
 /// Between scans the state follows the motion, so that the reach of an object that is not seen grows.
 ///
 /// ## Use it when
-/// it is to be known what a filter is worth. Publications omit this row, although it is better than several of theirs.
+/// it is to be known what a filter is worth. Publications omit this row, although it is better than several
+/// of theirs.
 ///
 /// ## Reference
-/// Principal axes of a sample covariance; the noise is subtracted and thin extents are lifted to 1 % of their length.
+/// Principal axes of a sample covariance; the noise is subtracted and thin extents are lifted to 1 % of their
+/// length.
 ///
 /// ```
 /// use nalgebra::Matrix2;
@@ -54,7 +56,8 @@ pub struct Seen<const N: usize> {
 }
 
 impl<T> Centroid<T> {
-    /// A reader of scans whose points spread like this, with the extent matrix (m²) that stands until three points tell another.
+    /// A reader of scans whose points spread like this, with the extent matrix (m²) that stands until three
+    /// points tell another.
     ///
     /// # Errors
     /// When the extent is not positive definite.

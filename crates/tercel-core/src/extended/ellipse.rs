@@ -11,7 +11,8 @@ use crate::error::FilterError;
 /// ```text
 /// { z : (z - c)ᵀ X⁻¹ (z - c) ≤ 1 },      X = R(θ) diag(a², b²) R(θ)ᵀ
 /// ```
-/// `X` is the *extent matrix*: its eigenvalues are the squares of the semi-axes (half the length, half the width).
+/// `X` is the *extent matrix*: its eigenvalues are the squares of the semi-axes (half the length, half the
+/// width).
 ///
 /// ```
 /// use nalgebra::vector;

@@ -30,9 +30,10 @@ const REACH: f64 = 6.0;
 /// Multiplies a normal density of the velocity with the likelihood of its direction, and takes moments.
 ///
 /// ## Definition
-/// In polar coordinates the density of heading `θ` and speed `r` is `N(r u(θ); m, P) r`. For each heading the speed is integrated in
-/// closed form (moments of a truncated normal), and headings by the trapezoidal rule, which converges exponentially for
-/// densities that are periodic or have decayed at the ends. The nodes are as dense as the sharper of the two densities needs.
+/// In polar coordinates the density of heading `θ` and speed `r` is `N(r u(θ); m, P) r`. For each heading the
+/// speed is integrated in closed form (moments of a truncated normal), and headings by the trapezoidal rule,
+/// which converges exponentially for densities that are periodic or have decayed at the ends. The nodes are
+/// as dense as the sharper of the two densities needs.
 pub(super) fn fuse(velocity: &Gaussian<2>, likelihood: &AngleLikelihood) -> Option<Fused> {
     let precision = inverse(&velocity.covariance);
     let pull = precision * velocity.mean;

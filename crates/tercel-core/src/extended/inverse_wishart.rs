@@ -12,8 +12,8 @@ use crate::error::FilterError;
 /// ```text
 /// p(X) ∝ |X|^(-v/2) exp(-tr(V X⁻¹)/2),      X̂ = E[X] = V / λ,    λ = v - 6
 /// ```
-/// Inside are the mean `X̂` and the weight `λ`: about the number of points that the belief is worth. Both stay meaningful when
-/// nearly everything is forgotten, where `V` vanishes.
+/// Inside are the mean `X̂` and the weight `λ`: about the number of points that the belief is worth. Both
+/// stay meaningful when nearly everything is forgotten, where `V` vanishes.
 ///
 /// | parametrisation | constructor |
 /// |---|---|
@@ -52,7 +52,8 @@ pub enum Freedom {
 /// Weight of the least certain belief whose matrix still has a second moment.
 const LEAST_WITH_VARIANCE: f64 = 2.05;
 
-/// Smallest weight, of a belief that is as good as forgotten: less, and its densities leave the range of a double.
+/// Smallest weight, of a belief that is as good as forgotten: less, and its densities leave the range of a
+/// double.
 const LEAST: f64 = 1e-6;
 
 /// Largest weight that a moment match gives: beyond it, the difference of moments is rounding.
@@ -144,11 +145,12 @@ impl InverseWishart {
         self.mean = congruent(a, &self.mean);
     }
 
-    /// The prediction of Lan and Li: the extent after a step is Wishart with `δ` degrees of freedom and the mean `X̂`.
+    /// The prediction of Lan and Li: the extent after a step is Wishart with `δ` degrees of freedom and the
+    /// mean `X̂`.
     ///
     /// ## Reference
-    /// Lan and Li (2012), eqs. 12 and 13 for [`Freedom::Printed`]; the exact variance match is derived from the second
-    /// moments of both distributions.
+    /// Lan and Li (2012), eqs. 12 and 13 for [`Freedom::Printed`]; the exact variance match is derived from
+    /// the second moments of both distributions.
     #[inline]
     pub fn diffuse(&mut self, delta: f64, freedom: Freedom) {
         // Below a weight of one the printed formula turns round and grows without bound.
@@ -170,7 +172,8 @@ impl InverseWishart {
         self.weight = total;
     }
 
-    /// Replaces this belief by the one with the mean and the mean trace of the square of a mixture of itself and `other`.
+    /// Replaces this belief by the one with the mean and the mean trace of the square of a mixture of itself
+    /// and `other`.
     ///
     /// ## Definition
     /// With the mixture's `X̂`, `M₂ = tr E[X²]`, `t₁ = tr X̂` and `t₂ = tr X̂²`:

@@ -21,8 +21,9 @@ use crate::sensor::Sensor;
 /// A scan that tells no angle (fewer than two points, a round object) leaves it as it was.
 ///
 /// ## Use it when
-/// the type of object is known: its length and width from a register or a data sheet. With [`Pointing::Scan`] no assumption ties the
-/// angle to the motion; with [`Pointing::Course`] the object points where it goes. [`Aligned`](super::Aligned) weighs both.
+/// the type of object is known: its length and width from a register or a data sheet. With [`Pointing::Scan`]
+/// no assumption ties the angle to the motion; with [`Pointing::Course`] the object points where it goes.
+/// [`Aligned`](super::Aligned) weighs both.
 ///
 /// ## Reference
 /// Maximum likelihood of the angle under a normal scatter; own formulation.

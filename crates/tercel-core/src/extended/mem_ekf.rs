@@ -10,11 +10,13 @@ use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
 use crate::motion::Motion;
 use crate::sensor::{Position, Sensor};
 
-/// Estimates motion, and angle and semi-axes of the extent with a covariance of their own, one point after the other.
+/// Estimates motion, and angle and semi-axes of the extent with a covariance of their own, one point after
+/// the other.
 ///
 /// ## Recursion
-/// The shape is `p = (α, l₁, l₂)` with covariance `C_p`. A point is `z = H x + S(p) h + e`, `S(p) = R(α) diag(l₁, l₂)`, with a multiplicative
-/// error `h` of covariance `s I` and noise `R`. With the rows `S_i` and their Jacobians `J_i`:
+/// The shape is `p = (α, l₁, l₂)` with covariance `C_p`. A point is `z = H x + S(p) h + e`, `S(p) = R(α)
+/// diag(l₁, l₂)`, with a multiplicative error `h` of covariance `s I` and noise `R`. With the rows `S_i` and
+/// their Jacobians `J_i`:
 /// ```text
 /// predict   x, P by the motion;   C_p ← C_p + dt Q_p
 /// for each point, everything linearised anew:
@@ -24,12 +26,14 @@ use crate::sensor::{Position, Sensor};
 /// ```
 ///
 /// ## Use it when
-/// axes and angle are to have priors and noises of their own: a rigid object that turns. The prior has to be fair: a size that is
-/// wrong by half is kept for long. Points are worked through in their order, which matters a little.
+/// axes and angle are to have priors and noises of their own: a rigid object that turns. The prior has to be
+/// fair: a size that is wrong by half is kept for long. Points are worked through in their order, which
+/// matters a little.
 ///
 /// ## Reference
-/// Yang and Baum (2019), "Tracking the orientation and axes lengths of an elliptical extended object", algorithm 1. Deviations:
-/// axes stay above 1 % of their prior; a point after which the shape would have no covariance leaves the shape as it is.
+/// Yang and Baum (2019), "Tracking the orientation and axes lengths of an elliptical extended object",
+/// algorithm 1. Deviations: axes stay above 1 % of their prior; a point after which the shape would have no
+/// covariance leaves the shape as it is.
 ///
 /// ```
 /// use nalgebra::{Matrix2, Matrix3, vector};
@@ -67,7 +71,8 @@ pub struct Shaped<const N: usize> {
 const THINNEST: f64 = 0.01;
 
 impl<T> MemEkf<T> {
-    /// A filter that starts with this angle and these semi-axes, to which every second adds these variances (rad²/s, m²/s).
+    /// A filter that starts with this angle and these semi-axes, to which every second adds these variances
+    /// (rad²/s, m²/s).
     ///
     /// # Errors
     /// When an axis is not positive, a number not finite, or a variance negative.

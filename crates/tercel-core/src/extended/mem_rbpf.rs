@@ -30,13 +30,13 @@ use crate::sensor::Sensor;
 /// The weights need only the count, mean and scatter of the points; the axes take them one by one.
 ///
 /// ## Use it when
-/// the angle is ambiguous for a while: an object that turns fast or is seen by few points. Ten particles follow an angle that is
-/// roughly known, fifty find one.
+/// the angle is ambiguous for a while: an object that turns fast or is seen by few points. Ten particles
+/// follow an angle that is roughly known, fifty find one.
 ///
 /// ## Reference
-/// Steuernagel and Baum (2025), "Extended object tracking by Rao-Blackwellized particle filtering for orientation estimation",
-/// algorithm 1. Deviations: the covariance of the position may take part in the weights
-/// ([`with_position`](MemRbpf::with_position)); axes stay above 1 % of their prior.
+/// Steuernagel and Baum (2025), "Extended object tracking by Rao-Blackwellized particle filtering for
+/// orientation estimation", algorithm 1. Deviations: the covariance of the position may take part in the
+/// weights ([`with_position`](MemRbpf::with_position)); axes stay above 1 % of their prior.
 ///
 /// ```
 /// use nalgebra::{Matrix2, vector};
@@ -132,8 +132,8 @@ impl<const N: usize> ShapeParticles<N> {
 const THINNEST: f64 = 0.01;
 
 impl<T> MemRbpf<T> {
-    /// A filter of `count` particles that starts with these semi-axes (m), with this seed for its random numbers. The axes are known
-    /// and the angle gathers 0.1 rad² a second until told otherwise.
+    /// A filter of `count` particles that starts with these semi-axes (m), with this seed for its random
+    /// numbers. The axes are known and the angle gathers 0.1 rad² a second until told otherwise.
     ///
     /// # Errors
     /// When there is no particle or an axis is not positive.

@@ -49,7 +49,8 @@ pub use scattering::Scattering;
 pub(crate) use symmetric::{congruent, rotation};
 pub use symmetric::{eigen, inverse_root, root};
 
-/// The methods of [`Filter`](crate::filter::Filter) that follow from a belief with a field `state` and a scan of points.
+/// The methods of [`Filter`](crate::filter::Filter) that follow from a belief with a field `state` and a scan
+/// of points.
 macro_rules! scan_state {
     () => {
         fn state(&self, belief: &Self::Belief) -> Gaussian<N> {

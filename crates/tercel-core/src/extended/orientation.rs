@@ -6,8 +6,8 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::{Points, Scattering};
 
-/// Logarithm of the density of at least one point around their own mean, for points of this covariance. Together with the
-/// density of the mean it is that of the points:
+/// Logarithm of the density of at least one point around their own mean, for points of this covariance.
+/// Together with the density of the mean it is that of the points:
 /// ```text
 /// Π N(z_j; p, Σ) = N(z̄; p, Σ/n) · (2π)^(1-n) n⁻¹ |Σ|^((1-n)/2) exp(-tr(Σ⁻¹ Z)/2)
 /// ```

@@ -5,18 +5,21 @@ use nalgebra::Vector2;
 use super::Points;
 use crate::association::PlaceIndex;
 
-/// Cuts points into cells: two points share a cell when a chain of points with steps of at most `distance` metres joins them.
+/// Cuts points into cells: two points share a cell when a chain of points with steps of at most `distance`
+/// metres joins them.
 ///
 /// ## Definition
-/// The connected components of the graph whose edges join points at most `distance` apart, in the order of their first point.
+/// The connected components of the graph whose edges join points at most `distance` apart, in the order of
+/// their first point.
 ///
 /// ## Use it when
-/// a tracker of many objects is to take extended ones: each cell is one measurement. The distance should be above the usual gap
-/// between the points of one object and below the gap between objects. Objects that touch come as one cell.
+/// a tracker of many objects is to take extended ones: each cell is one measurement. The distance should be
+/// above the usual gap between the points of one object and below the gap between objects. Objects that touch
+/// come as one cell.
 ///
 /// ## Reference
-/// Granström, Lundquist and Orguner (2012), section IV.A, with one distance. A grid finds neighbours, so the cost grows with the number
-/// of points and not with its square.
+/// Granström, Lundquist and Orguner (2012), section IV.A, with one distance. A grid finds neighbours, so the
+/// cost grows with the number of points and not with its square.
 ///
 /// ```
 /// use nalgebra::vector;

@@ -10,8 +10,8 @@ use crate::error::FilterError;
 /// ```text
 /// n,    z̄ = 1/n Σ z_j,    Z = Σ (z_j - z̄)(z_j - z̄)ᵀ
 /// ```
-/// The moments are taken once: they are all that random-matrix filters need of a scan, however many points it has. Without
-/// points, mean and scatter are zero.
+/// The moments are taken once: they are all that random-matrix filters need of a scan, however many points it
+/// has. Without points, mean and scatter are zero.
 ///
 /// ```
 /// use nalgebra::vector;

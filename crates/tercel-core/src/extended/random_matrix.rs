@@ -13,11 +13,12 @@ use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
 use crate::motion::Motion;
 use crate::sensor::{Measurement, Position, Sensor};
 
-/// Estimates motion and extent of an object that gives many points a scan: the family of random-matrix filters.
+/// Estimates motion and extent of an object that gives many points a scan: the family of random-matrix
+/// filters.
 ///
 /// ## Recursion
-/// The belief is a Gaussian `(x, P)` and an [`InverseWishart`] `(X̂, λ)`. With the count `n`, mean `z̄` and scatter `Z` of the
-/// [`Points`], and the covariance `Y` of one point around the centre:
+/// The belief is a Gaussian `(x, P)` and an [`InverseWishart`] `(X̂, λ)`. With the count `n`, mean `z̄` and
+/// scatter `Z` of the [`Points`], and the covariance `Y` of one point around the centre:
 /// ```text
 /// predict   x, P by the motion;   X̂, λ by the Evolution
 /// update    S = H P Hᵀ + Y/n,   ε = z̄ - H x,   x, P as a Kalman filter with the noise Y/n
@@ -30,18 +31,20 @@ use crate::sensor::{Measurement, Position, Sensor};
 /// | `Distorted` | `Y = s X̂ + R` | Feldmann, Fränken and Koch; Lan and Li with `B = Y^½ X̂^-½` |
 /// | `Variational` | the true position of every point is estimated, too | Orguner; VB-RMM |
 ///
-/// The likelihood integrates over the extent, so that hypotheses and modes that differ in it can be compared. Without points an
-/// update changes nothing but the [`Rate`], if there is one.
+/// The likelihood integrates over the extent, so that hypotheses and modes that differ in it can be compared.
+/// Without points an update changes nothing but the [`Rate`], if there is one.
 ///
 /// ## Use it when
 /// the sensor resolves the object: some five points a scan or more. The motion may be any; modes of an
-/// [`Imm`](crate::filter::Imm) mix their extents. `Distorted` costs least and is hard to beat when the extent is forgotten
-/// slowly; `Variational` is better when sensor noise and extent are of one size, or the extent turns fast.
+/// [`Imm`](crate::filter::Imm) mix their extents. `Distorted` costs least and is hard to beat when the extent
+/// is forgotten slowly; `Variational` is better when sensor noise and extent are of one size, or the extent
+/// turns fast.
 ///
 /// ## Reference
-/// Koch (2008), eqs. 27 to 45 with the full covariance `P` instead of `P̃ ⊗ X`; Feldmann, Fränken and Koch (2011), eqs. 20 to
-/// 31; Orguner (2012); Lan and Li (2012), eqs. 10 to 25. Deviations: extents keep their mean when they are forgotten, with
-/// a weight `λ` that stays positive where the printed degrees of freedom would not; the likelihood is derived for this form.
+/// Koch (2008), eqs. 27 to 45 with the full covariance `P` instead of `P̃ ⊗ X`; Feldmann, Fränken and Koch
+/// (2011), eqs. 20 to 31; Orguner (2012); Lan and Li (2012), eqs. 10 to 25. Deviations: extents keep their
+/// mean when they are forgotten, with a weight `λ` that stays positive where the printed degrees of freedom
+/// would not; the likelihood is derived for this form.
 ///
 /// ```
 /// use nalgebra::{Matrix2, matrix};
@@ -74,7 +77,8 @@ pub struct RandomMatrix<T> {
 /// How points change the belief about the extent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
-    /// The matrix is the covariance of the points; the extent is what is left of it without the sensor noise, over the scale.
+    /// The matrix is the covariance of the points; the extent is what is left of it without the sensor noise,
+    /// over the scale.
     Direct,
     /// The covariance of the points is `s X + R` with the predicted extent.
     Distorted,
@@ -101,7 +105,8 @@ enum Fading {
 }
 
 impl Evolution {
-    /// The weight of the extent falls to `1/e` in `time` seconds; infinity for a rigid object whose direction is fixed.
+    /// The weight of the extent falls to `1/e` in `time` seconds; infinity for a rigid object whose direction
+    /// is fixed.
     ///
     /// # Errors
     /// When the time is not positive.
@@ -113,8 +118,8 @@ impl Evolution {
         Err(FilterError::Parameter { parameter, value: time, expected })
     }
 
-    /// The extent after a step is Wishart with `delta` degrees of freedom around the one before: Lan and Li. The step is that
-    /// between scans, whatever its length.
+    /// The extent after a step is Wishart with `delta` degrees of freedom around the one before: Lan and Li.
+    /// The step is that between scans, whatever its length.
     ///
     /// # Errors
     /// Unless `delta` is above 1.
@@ -127,8 +132,8 @@ impl Evolution {
         Ok(Evolution { fading: Fading::Wishart { delta, freedom, shrink: 1.0 }, turn_rate: 0.0 })
     }
 
-    /// Multiplies the mean extent by this factor in every step, as a transition `A = I/δ` does with the factor `1/δ`. Only for
-    /// comparison with publications: extents do not shrink by themselves.
+    /// Multiplies the mean extent by this factor in every step, as a transition `A = I/δ` does with the
+    /// factor `1/δ`. Only for comparison with publications: extents do not shrink by themselves.
     pub fn with_shrinking(self, factor: f64) -> Self {
         match self.fading {
             Fading::Wishart { delta, freedom, .. } => {
@@ -171,7 +176,8 @@ pub struct GaussianInverseWishart<const N: usize> {
 }
 
 impl<T> RandomMatrix<T> {
-    /// A filter of this motion, with the extent of a new object (with [`Rule::Direct`]: the covariance of its points).
+    /// A filter of this motion, with the extent of a new object (with [`Rule::Direct`]: the covariance of its
+    /// points).
     pub fn new(
         motion: T,
         scattering: Scattering,
@@ -182,7 +188,8 @@ impl<T> RandomMatrix<T> {
         RandomMatrix { motion, scattering, prior, evolution, rule, rate: None }
     }
 
-    /// Estimates how many points an object gives, too, from this prior, which is forgotten over `time` seconds.
+    /// Estimates how many points an object gives, too, from this prior, which is forgotten over `time`
+    /// seconds.
     ///
     /// # Errors
     /// When the time is not positive.

@@ -14,12 +14,12 @@ use crate::error::FilterError;
 /// The factor `n!` makes it the density of a set of points rather than of a list.
 ///
 /// ## Use it when
-/// the number of points tells something: an empty scan then speaks against an object that used to give twenty, and an object
-/// with many points is not taken for one with few.
+/// the number of points tells something: an empty scan then speaks against an object that used to give
+/// twenty, and an object with many points is not taken for one with few.
 ///
 /// ## Reference
-/// Granström and Orguner (2012), "Estimation and maintenance of measurement rates for multiple extended target tracking",
-/// eqs. 10 to 13.
+/// Granström and Orguner (2012), "Estimation and maintenance of measurement rates for multiple extended
+/// target tracking", eqs. 10 to 13.
 ///
 /// ```
 /// use tercel_core::extended::Rate;

@@ -8,7 +8,8 @@ use crate::error::FilterError;
 /// The spread of points over an extent, and the noise of the sensor on top.
 ///
 /// ## Definition
-/// A point is `z = p + y + e` with `y` spread over the ellipse of the extent matrix `X` and `e` of covariance `R`:
+/// A point is `z = p + y + e` with `y` spread over the ellipse of the extent matrix `X` and `e` of covariance
+/// `R`:
 /// ```text
 /// Cov(z - p) = s X + R
 /// ```
@@ -79,8 +80,9 @@ impl Scattering {
         extent * self.scale + self.noise
     }
 
-    /// The extent matrix (m²) whose points have this covariance. What is thinner than the sensor resolves is taken to be as thick as
-    /// its noise: semi-axes are not below the least deviation of the noise, or 1 % of the spread.
+    /// The extent matrix (m²) whose points have this covariance. What is thinner than the sensor resolves is
+    /// taken to be as thick as its noise: semi-axes are not below the least deviation of the noise, or 1 % of
+    /// the spread.
     pub fn extent(&self, spread: &Matrix2<f64>) -> Matrix2<f64> {
         let extent = (spread - self.noise) / self.scale;
         let resolved = super::symmetric::eigen(&self.noise).0.y;

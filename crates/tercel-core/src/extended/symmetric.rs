@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-/// Eigenvalues of a symmetric 2 × 2 matrix, the larger first, and the angle of the larger one's direction, in `(-π/2, π/2]`.
+/// Eigenvalues of a symmetric 2 × 2 matrix, the larger first, and the angle of the larger one's direction, in
+/// `(-π/2, π/2]`.
 ///
 /// A multiple of the identity has no direction; the angle is then 0.
 ///
@@ -32,7 +33,8 @@ pub fn eigen(matrix: &Matrix2<f64>) -> (Vector2<f64>, f64) {
 /// ```
 ///
 /// ## Use it when
-/// a whitening is needed that does not turn the axes. It has no branches and is smooth, so it can be differentiated.
+/// a whitening is needed that does not turn the axes. It has no branches and is smooth, so it can be
+/// differentiated.
 ///
 /// ## Reference
 /// Levinger (1980), "The square root of a 2 × 2 matrix".

@@ -8,15 +8,16 @@ use crate::error::FilterError;
 use crate::motion::Motion;
 use crate::sensor::{Measurement, Sensor};
 
-/// Estimates the state of an object whose motion or sensor is smooth but not linear, by linearising both at the mean.
+/// Estimates the state of an object whose motion or sensor is smooth but not linear, by linearising both at
+/// the mean.
 ///
 /// ## Recursion
-/// That of the [`Kalman`](super::Kalman) filter, with `x⁻ = f(x)`, `F = ∂f/∂x`, `ν = z ⊖ h(x⁻)` and `H = ∂h/∂x` at the
-/// predicted mean; `⊖` wraps angles.
+/// That of the [`Kalman`](super::Kalman) filter, with `x⁻ = f(x)`, `F = ∂f/∂x`, `ν = z ⊖ h(x⁻)` and `H =
+/// ∂h/∂x` at the predicted mean; `⊖` wraps angles.
 ///
 /// ## Use it when
-/// the sensor is polar or the turn rate is estimated, and the state is known well against the curvature. Bearing-only starts
-/// and wide cross-range errors call for an unscented or a particle filter.
+/// the sensor is polar or the turn rate is estimated, and the state is known well against the curvature.
+/// Bearing-only starts and wide cross-range errors call for an unscented or a particle filter.
 ///
 /// ## Reference
 /// Bar-Shalom, Li and Kirubarajan (2001), section 10.3.2 (first order), with the update in Joseph's form.

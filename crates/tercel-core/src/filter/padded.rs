@@ -6,20 +6,22 @@ use super::{Filter, Innovation};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
-/// Estimates a state of `N` components with a filter of its first `K`, so that it can stand beside filters of all `N`.
+/// Estimates a state of `N` components with a filter of its first `K`, so that it can stand beside filters of
+/// all `N`.
 ///
 /// ## Definition
-/// The filter works on the leading `K` components. The rest has mean zero, the stated deviation, and no correlation with
-/// anything, after every step:
+/// The filter works on the leading `K` components. The rest has mean zero, the stated deviation, and no
+/// correlation with anything, after every step:
 /// ```text
 /// x = (x_K, 0)        P = diag(P_K, σ² I)
 /// ```
 ///
 /// ## Use it when
-/// modes of an [`Imm`](super::Imm) have states of different length: a straight model without accelerations beside one that
-/// estimates them. The deviation says how far the missing components may be from zero while this mode holds: when the
-/// larger model takes over, mixing starts it there. About the size that these components reach in the larger model is right;
-/// a tiny one would hold the larger model back after every change.
+/// modes of an [`Imm`](super::Imm) have states of different length: a straight model without accelerations
+/// beside one that estimates them. The deviation says how far the missing components may be from zero while
+/// this mode holds: when the larger model takes over, mixing starts it there. About the size that these
+/// components reach in the larger model is right; a tiny one would hold the larger model back after every
+/// change.
 ///
 /// ## Reference
 /// Bar-Shalom, Li and Kirubarajan (2001), section 11.6.7, on models of different dimension.

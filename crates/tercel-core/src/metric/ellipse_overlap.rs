@@ -10,22 +10,23 @@ use crate::extended::Ellipse;
 /// The area that two ellipses share over the area that they cover: 1 for equal ones, 0 for separate ones.
 ///
 /// ## Definition
-/// The plane is transformed so that the larger ellipse is the unit circle and the axes of the other lie along `x` and `y`. Their
-/// boundaries cross where
+/// The plane is transformed so that the larger ellipse is the unit circle and the axes of the other lie along
+/// `x` and `y`. Their boundaries cross where
 /// ```text
 /// (c₁ + p cos s)² + (c₂ + q sin s)² = 1
 /// ```
-/// a polynomial of degree four in the tangent of half the angle, whose roots are bracketed by those of its derivatives. Between
-/// crossings the boundary of the intersection is an arc of the circle or of the ellipse, and Green's theorem gives its area in
-/// closed form. Ratios of areas are the same in the transformed plane.
+/// a polynomial of degree four in the tangent of half the angle, whose roots are bracketed by those of its
+/// derivatives. Between crossings the boundary of the intersection is an arc of the circle or of the ellipse,
+/// and Green's theorem gives its area in closed form. Ratios of areas are the same in the transformed plane.
 ///
 /// ## Use it when
-/// extents are to be compared with the truth. It says nothing about how far apart two ellipses are that do not touch: see
-/// [`wasserstein`](crate::metric::wasserstein). An ellipse without area overlaps with nothing.
+/// extents are to be compared with the truth. It says nothing about how far apart two ellipses are that do
+/// not touch: see [`wasserstein`](crate::metric::wasserstein). An ellipse without area overlaps with nothing.
 ///
 /// ## Reference
-/// Hughes and Chraibi (2012), "Calculating ellipse overlap areas", for the arcs; own computation of the crossings, which holds for
-/// ratios of axes up to 10⁶. Validated against the clip of polygons with 256 corners.
+/// Hughes and Chraibi (2012), "Calculating ellipse overlap areas", for the arcs; own computation of the
+/// crossings, which holds for ratios of axes up to 10⁶. Validated against the clip of polygons with 256
+/// corners.
 ///
 /// ```
 /// use nalgebra::vector;
@@ -60,7 +61,8 @@ struct Whitened {
 impl Whitened {
     fn new(large: &Ellipse, small: &Ellipse) -> Option<Whitened> {
         let (sine, cosine) = (small.angle - large.angle).sin_cos();
-        // The columns of this matrix are the semi-axes of the smaller ellipse where the larger is the unit circle.
+        // The columns of this matrix are the semi-axes of the smaller ellipse where the larger is the unit
+        // circle.
         let columns = Matrix2::new(
             cosine * small.axes.x / large.axes.x,
             -sine * small.axes.y / large.axes.x,
@@ -118,8 +120,8 @@ impl Whitened {
             .sum()
     }
 
-    /// Whether an arc between two crossings lies in the circle. It may touch the circle at one point, so two are asked, and the one
-    /// that is farther from the circle decides.
+    /// Whether an arc between two crossings lies in the circle. It may touch the circle at one point, so two
+    /// are asked, and the one that is farther from the circle decides.
     fn is_within(&self, from: f64, to: f64) -> bool {
         let (first, second) =
             (self.outside(from + 0.4 * (to - from)), self.outside(from + 0.7 * (to - from)));

@@ -18,21 +18,24 @@ impl Wasserstein {
     }
 }
 
-/// The squared Gaussian Wasserstein distance of two ellipses, given by their centres (m) and extent matrices (m²).
+/// The squared Gaussian Wasserstein distance of two ellipses, given by their centres (m) and extent matrices
+/// (m²).
 ///
 /// ## Definition
 /// ```text
 /// |p - p̄|² + tr X + tr X̄ - 2 tr (X^½ X̄ X^½)^½
 /// tr (X^½ X̄ X^½)^½ = √( tr(X X̄) + 2 √(|X| |X̄|) )          in two dimensions
 /// ```
-/// The matrices have the squares of the semi-axes as eigenvalues, so the shapes of two parallel ellipses are as far apart as their
-/// semi-axes: `(a - ā)² + (b - b̄)²`. No root is taken, as in the tables that compare extended-object trackers.
+/// The matrices have the squares of the semi-axes as eigenvalues, so the shapes of two parallel ellipses are
+/// as far apart as their semi-axes: `(a - ā)² + (b - b̄)²`. No root is taken, as in the tables that compare
+/// extended-object trackers.
 ///
 /// ## Use it when
 /// extents are compared and should also count when they do not overlap.
 ///
 /// ## Reference
-/// Yang, Baum and Granström (2016), "Metrics for performance evaluation of elliptic extended object tracking methods", eq. 12.
+/// Yang, Baum and Granström (2016), "Metrics for performance evaluation of elliptic extended object tracking
+/// methods", eq. 12.
 ///
 /// ```
 /// use nalgebra::{matrix, vector};

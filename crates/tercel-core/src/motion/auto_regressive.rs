@@ -7,7 +7,8 @@ use crate::belief::Gaussian;
 
 /// Moves with a velocity that is a weighted sum of the last `B` velocities, and noise.
 ///
-/// State: `x, y`, then the last `B` velocities, the newest first: `vx, vy, vx', vy', ..`, `N = 2 + 2 B` components.
+/// State: `x, y`, then the last `B` velocities, the newest first: `vx, vy, vx', vy', ..`, `N = 2 + 2 B`
+/// components.
 ///
 /// ## Model
 /// ```text
@@ -15,10 +16,12 @@ use crate::belief::Gaussian;
 /// p(k) = p(k-1) + T v(k)                                          backward: with the new velocity
 /// p(k) = p(k-1) + T v(k-1)                                        forward: with the old one
 /// ```
-/// The model is tied to its interval `T`. A longer time is as many steps as come nearest to it; what remains is straight motion.
+/// The model is tied to its interval `T`. A longer time is as many steps as come nearest to it; what remains
+/// is straight motion.
 ///
 /// ## Use it when
-/// motion repeats itself over several scans, and the weights are known or identified: resampled tracks, oscillating courses.
+/// motion repeats itself over several scans, and the weights are known or identified: resampled tracks,
+/// oscillating courses.
 ///
 /// ## Reference
 /// Zaidi and Mark (2010), eq. 1.
@@ -156,8 +159,8 @@ impl AutoRegression {
 }
 
 impl<const B: usize> AutoRegressive<B> {
-    /// A motion with these weights, `a₁` first, steps of `interval` seconds, and this standard deviation of each new velocity, m/s
-    /// per axis.
+    /// A motion with these weights, `a₁` first, steps of `interval` seconds, and this standard deviation of
+    /// each new velocity, m/s per axis.
     pub fn new(coefficients: SVector<f64, B>, interval: f64, deviation: f64) -> Self {
         AutoRegressive { coefficients, regression: AutoRegression::new(interval, deviation) }
     }

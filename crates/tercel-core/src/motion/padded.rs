@@ -14,8 +14,8 @@ use crate::belief::Gaussian;
 ///
 /// ## Use it when
 /// modes of an IMM have states of different length, and their filters take a motion:
-/// [`filter::Padded`](crate::filter::Padded) does the same for a whole filter with a Gaussian belief. The deviation says how far the
-/// missing components may be from zero while this mode holds.
+/// [`filter::Padded`](crate::filter::Padded) does the same for a whole filter with a Gaussian belief. The
+/// deviation says how far the missing components may be from zero while this mode holds.
 ///
 /// ## Reference
 /// Bar-Shalom, Li and Kirubarajan (2001), section 11.6.7, on models of different dimension.

@@ -7,16 +7,19 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 use super::{Ride, Scatterers};
 use crate::{SimulationError, Stream};
 
-/// A scene in which ellipses on straight courses with small disturbances cross in the middle of a square, among false points.
+/// A scene in which ellipses on straight courses with small disturbances cross in the middle of a square,
+/// among false points.
 ///
 /// ## Definition
-/// Object `i` of `n` begins on a circle of 150 m radius, at an angle that is drawn around `2π i/n`, and heads for a point near the
-/// centre at 8 to 12 m/s, so that all pass within some ten metres of each other about half-way. Its velocity gathers white noise of
-/// density 0.05 m²/s³; its semi-axes are drawn from 6 m to 12 m by 2 m to 4 m, and it points where it goes. Each is detected with
-/// probability 0.95 and then gives points as its [`Scatterers`] say. False points are spread evenly over the square of 400 m.
+/// Object `i` of `n` begins on a circle of 150 m radius, at an angle that is drawn around `2π i/n`, and heads
+/// for a point near the centre at 8 to 12 m/s, so that all pass within some ten metres of each other about
+/// half-way. Its velocity gathers white noise of density 0.05 m²/s³; its semi-axes are drawn from 6 m to 12 m
+/// by 2 m to 4 m, and it points where it goes. Each is detected with probability 0.95 and then gives points
+/// as its [`Scatterers`] say. False points are spread evenly over the square of 400 m.
 ///
 /// ## Use it when
-/// trackers of several extended objects are compared: association, cells that two objects share, and false points.
+/// trackers of several extended objects are compared: association, cells that two objects share, and false
+/// points.
 ///
 /// ```
 /// use nalgebra::Matrix2;

@@ -16,7 +16,8 @@ use crate::Stream;
 /// | `Smoothed` | `χ` of the mean of the velocities of 7 steps, 3 to either side |
 /// | `Crab` | the smoothed one, turned into a wind that is constant over the track: `sin(θ - χ) = -w_across / V` |
 ///
-/// The wind of a track is drawn with a deviation of 8 m/s on each axis of the plane. `V` is the speed, at least the wind's.
+/// The wind of a track is drawn with a deviation of 8 m/s on each axis of the plane. `V` is the speed, at
+/// least the wind's.
 ///
 /// ```
 /// use nalgebra::vector;
@@ -47,7 +48,8 @@ const WIND: f64 = 8.0;
 const STANDING: f64 = 0.3;
 
 impl Heading {
-    /// The direction at each state `x, y, vx, vy`, rad. The wind depends on the seed and the number of the run.
+    /// The direction at each state `x, y, vx, vy`, rad. The wind depends on the seed and the number of the
+    /// run.
     pub fn angles(self, states: &[Vector4<f64>], seed: u64, run: u64) -> Vec<f64> {
         let mut random = Stream::Truth.of(seed, run);
         let wind = Vector2::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut random) }) * WIND;

@@ -34,7 +34,8 @@ pub struct Ride {
 }
 
 impl Ride {
-    /// A truth with these states (`x, y, vx, vy`), directions of the first semi-axis (rad), and semi-axes (m).
+    /// A truth with these states (`x, y, vx, vy`), directions of the first semi-axis (rad), and semi-axes
+    /// (m).
     ///
     /// # Errors
     /// When there is not one angle per state, or a number is not finite or not positive where it has to be.
@@ -88,7 +89,8 @@ impl Ride {
         Ellipse { center: Vector2::new(state.x, state.y), axes: self.axes, angle: self.angles[step] }
     }
 
-    /// The points that are seen at each step. They depend on the seed, the number of the run and the truth alone.
+    /// The points that are seen at each step. They depend on the seed, the number of the run and the truth
+    /// alone.
     pub fn observe(&self, scatterers: &Scatterers, seed: u64, run: u64) -> Vec<Points> {
         let mut noise = Stream::Noise { realisation: 0 }.of(seed, run);
         let mut counts = Stream::Detection { realisation: 0 }.of(seed, run);

@@ -16,16 +16,16 @@ use crate::{Interval, SimulationError, Stream};
 /// v(k) = Σ_i a_i v(k-i) + ε(k)
 /// p(k) = p(k-1) + T v(k)            backward; forward: p(k-1) + T v(k-1)
 /// ```
-/// The first 200 steps are dropped, and the position then begins at zero. The ellipse points along the velocity; below 0.3 m/s it
-/// keeps its direction.
+/// The first 200 steps are dropped, and the position then begins at zero. The ellipse points along the
+/// velocity; below 0.3 m/s it keeps its direction.
 ///
 /// ## Use it when
 /// filters of one extended object are compared: this is the population of the RMMNet paper.
 ///
 /// ## Reference
-/// RMMNet paper, section IV.A and eq. 43. It says nothing about unstable weights, which its text draws in 97 % of all cases; the
-/// generators are three ways to stable ones. As printed the position moves with the old velocity, whose noise no filter can have seen;
-/// its figures need the new one, which is the default.
+/// RMMNet paper, section IV.A and eq. 43. It says nothing about unstable weights, which its text draws in 97
+/// % of all cases; the generators are three ways to stable ones. As printed the position moves with the old
+/// velocity, whose noise no filter can have seen; its figures need the new one, which is the default.
 ///
 /// ```
 /// use tercel_sim::extended::{Generator, Vehicle};
@@ -44,7 +44,8 @@ pub struct Vehicle {
     sizes: Sizes,
 }
 
-/// How the weights of a vehicle are drawn. All draw numbers from `(-1, 1)` and sort them by size, the largest first.
+/// How the weights of a vehicle are drawn. All draw numbers from `(-1, 1)` and sort them by size, the largest
+/// first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Generator {
     /// All again until the motion is stable: velocities that oscillate, some for long.
@@ -117,7 +118,8 @@ impl Generator {
     }
 }
 
-/// Whether all roots lie inside the unit circle: the reflection coefficients of the step-down recursion are below one.
+/// Whether all roots lie inside the unit circle: the reflection coefficients of the step-down recursion are
+/// below one.
 fn is_stable(weights: &[f64]) -> bool {
     let mut polynomial: Vec<f64> = weights.iter().map(|weight| -weight).collect();
     while let Some(reflection) = polynomial.pop() {

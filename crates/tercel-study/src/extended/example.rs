@@ -21,7 +21,8 @@ const OBJECT: &str = "object";
 /// Steps that are drawn: more would hide the ellipses.
 const DRAWN: usize = 200;
 
-/// Draws the beginning of a recording: ellipses of the truth and of every method, points, and errors over time.
+/// Draws the beginning of a recording: ellipses of the truth and of every method, points, and errors over
+/// time.
 pub(super) fn draw(
     recording: &Recording,
     title: String,

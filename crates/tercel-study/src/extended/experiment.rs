@@ -26,8 +26,8 @@ pub struct ExtendedExperiment {
 }
 
 impl ExtendedExperiment {
-    /// The study of this name over a scene. `options` says in the tables what was chosen of it, and `settings` are the numbers to
-    /// which filters are tuned.
+    /// The study of this name over a scene. `options` says in the tables what was chosen of it, and
+    /// `settings` are the numbers to which filters are tuned.
     ///
     /// # Errors
     /// When a method is not known.

@@ -43,7 +43,8 @@ pub trait Method: Sync {
 /// Variance of the first state, in m² and m²/s²: filters begin at the truth, as published.
 const START: f64 = 10.0;
 
-/// Runs a filter over a recording, from the true first state on. Velocities before it are believed to be the first.
+/// Runs a filter over a recording, from the true first state on. Velocities before it are believed to be the
+/// first.
 pub(super) fn follow<const N: usize, F>(
     recording: &Recording,
     filter: &F,
@@ -57,7 +58,8 @@ where
     let mut belief = filter.birth(first)?;
     let start = recording.ride.states()[0];
     let state = filter.state(&belief);
-    // Components beyond position and velocity are velocities before, or accelerations, of which nothing is known.
+    // Components beyond position and velocity are velocities before, or accelerations, of which nothing is
+    // known.
     let before = |i: usize| if N > 6 { start[2 + i % 2] } else { state.mean[i] };
     let mean = SVector::<f64, N>::from_fn(|i, _| if i < 4 { start[i] } else { before(i) });
     let covariance = nalgebra::SMatrix::identity() * START;

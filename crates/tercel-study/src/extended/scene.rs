@@ -65,10 +65,11 @@ impl Scene {
 }
 
 impl Aircraft {
-    /// The tracks of a NumPy file, or of the only one in a folder: an array of `(tracks, steps, 4)` with `x, y, vx, vy`.
+    /// The tracks of a NumPy file, or of the only one in a folder: an array of `(tracks, steps, 4)` with `x,
+    /// y, vx, vy`.
     ///
-    /// The first four fifths of the tracks are for tuning and training; `test` takes the others. The interval is the one that fits
-    /// positions and velocities, which must be differences backwards in time.
+    /// The first four fifths of the tracks are for tuning and training; `test` takes the others. The interval
+    /// is the one that fits positions and velocities, which must be differences backwards in time.
     ///
     /// # Errors
     /// When there is no such file, or its array does not fit.

@@ -8,8 +8,8 @@ use tercel_core::metric::{Consistency, Rmse, intersection_over_union, nees, wass
 use super::{Recording, StepEstimate};
 use crate::monte_carlo::Outcome;
 
-/// Name, unit and whether the printed table has it, of each metric. The first step, at which filters are told the truth, does not
-/// count.
+/// Name, unit and whether the printed table has it, of each metric. The first step, at which filters are told
+/// the truth, does not count.
 ///
 /// | metric | meaning |
 /// |---|---|
@@ -42,11 +42,12 @@ const LOST: f64 = 0.1;
 /// Steps in a row below it that count as a failure.
 const LOST_STEPS: usize = 10;
 
-/// Scores the estimates of one recording. Curves are the squared position error per component, the overlap and the squared
-/// distance at each step.
+/// Scores the estimates of one recording. Curves are the squared position error per component, the overlap
+/// and the squared distance at each step.
 ///
 /// # Errors
-/// With a message, when an estimate is missing or not finite: what a method does not tell must be told at no step.
+/// With a message, when an estimate is missing or not finite: what a method does not tell must be told at no
+/// step.
 pub(super) fn score(recording: &Recording, estimates: &[StepEstimate]) -> Result<Outcome, String> {
     let truth = recording.ride.states();
     if estimates.len() != truth.len() {

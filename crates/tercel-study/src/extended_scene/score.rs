@@ -7,7 +7,8 @@ use tercel_sim::extended::Ride;
 use super::methods::Report;
 use crate::monte_carlo::Outcome;
 
-/// Name and unit of each metric: means over the scans after the first five. `iou` is that of the pairs which GOSPA makes.
+/// Name and unit of each metric: means over the scans after the first five. `iou` is that of the pairs which
+/// GOSPA makes.
 pub const METRICS: [(&str, &str); 5] =
     [("gospa", "m"), ("gospa_localisation", "m"), ("gospa_missed", "m"), ("gospa_false", "m"), ("iou", "")];
 

@@ -14,8 +14,9 @@ use crate::extended::{InverseWishart, Points, rate::ln_rising};
 /// ln L = -n ln π - ln n - (n-1)/2 ln(|Y|/|X̂|) + ½ ln(|X̂|/|S|)
 ///        - (λ+3)/2 ln(|V+ΔV|/|V|) - n/2 ln|V+ΔV| - n ln 2 + ln((λ+2)(λ+3)..(λ+n+1))
 /// ```
-/// The gamma functions of the inverse Wishart reduce to the product by Legendre's duplication formula. The quotient of
-/// determinants is taken as one number, so that a belief of great weight does not cancel its own digits.
+/// The gamma functions of the inverse Wishart reduce to the product by Legendre's duplication formula. The
+/// quotient of determinants is taken as one number, so that a belief of great weight does not cancel its own
+/// digits.
 pub(super) fn ln_points<const N: usize>(
     belief: &InverseWishart,
     spread: &Matrix2<f64>,

@@ -64,7 +64,8 @@ fn the_likelihood_is_that_of_normal_points_when_the_extent_is_known() {
 
 #[test]
 fn the_likelihood_integrates_over_the_extent() {
-    // With the state known and points at the scale of the extent, the product of predictive densities is the joint one.
+    // With the state known and points at the scale of the extent, the product of predictive densities is the
+    // joint one.
     let filter = RandomMatrix::new(
         ConstantVelocity::new(0.0),
         Scattering::direct(),

@@ -9,10 +9,12 @@ use crate::extended::symmetric::{congruent, inverse, symmetric};
 use crate::extended::{InverseWishart, Points};
 use crate::filter::Comparison;
 
-/// Estimates state, extent and the true position `y_j` of every point in turns, each given the newest of the others.
+/// Estimates state, extent and the true position `y_j` of every point in turns, each given the newest of the
+/// others.
 ///
 /// ## Recursion
-/// With `C = s V/(v-3)`, so that `C⁻¹ = E[(sX)⁻¹]`, and the gain `G = C (C + R)⁻¹` from a point to its true position:
+/// With `C = s V/(v-3)`, so that `C⁻¹ = E[(sX)⁻¹]`, and the gain `G = C (C + R)⁻¹` from a point to its true
+/// position:
 /// ```text
 /// ŷ_j = G z_j + (I - G) H m             Σ = G R               in the first turn ŷ_j = z_j, Σ = s V⁻/(v⁻-6)
 /// m, P: the prediction updated by mean ŷ with noise C/n
@@ -21,8 +23,9 @@ use crate::filter::Comparison;
 /// Only sums over the points enter, so a turn costs the same for any number of them.
 ///
 /// ## Reference
-/// Orguner (2012), "A variational measurement update for extended target tracking with random matrices", algorithm 1, with
-/// every turn using the newest values. `G` in place of inverses of `R` allows a sensor without noise.
+/// Orguner (2012), "A variational measurement update for extended target tracking with random matrices",
+/// algorithm 1, with every turn using the newest values. `G` in place of inverses of `R` allows a sensor
+/// without noise.
 pub(super) fn fixed_point<const N: usize, T>(
     filter: &RandomMatrix<T>,
     belief: &GaussianInverseWishart<N>,
@@ -40,7 +43,8 @@ pub(super) fn fixed_point<const N: usize, T>(
         let gain = covariance * inverse(&(covariance + inner / n));
         let position = place + gain * (mean - place);
         let offset = mean - position;
-        let uncertain = covariance - gain * covariance + sigma;
+        // P - K P without the difference, which would cancel where the prediction is vague.
+        let uncertain = gain * inner / n + sigma;
         let squares = scatter + (offset * offset.transpose() + uncertain) * n;
         let before = extent.mean();
         extent = belief.extent;

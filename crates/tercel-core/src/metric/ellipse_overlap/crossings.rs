@@ -23,8 +23,8 @@ const FINE: f64 = 1e-9;
 
 /// The crossings of the ellipse with this centre and these semi-axes along `x` and `y`.
 ///
-/// Each quarter of the ellipse has a chart of its own, centred at a vertex: near a vertex of a needle `t` is small, and its digits are all
-/// there.
+/// Each quarter of the ellipse has a chart of its own, centred at a vertex: near a vertex of a needle `t` is
+/// small, and its digits are all there.
 pub(super) fn crossings(centre: &Vector2<f64>, axes: &Vector2<f64>) -> Crossings {
     let mut found = Crossings { angles: [0.0; 8], count: 0 };
     let (x, y) = ((centre.x, axes.x), (centre.y, axes.y));

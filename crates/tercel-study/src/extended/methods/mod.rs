@@ -15,8 +15,8 @@
 //! | `aligned-ar` | the size | the same with an auto-regressive motion of order 10 that is identified on line |
 //! | `oracle` | the size, the motion | the same with the true motion: the limit of filters on count, mean and scatter |
 //!
-//! The suffix `-paper` is the configuration of the RMMNet paper; a plain name is what we would fly, tuned on other recordings with
-//! scatter scale and sensor noise inside.
+//! The suffix `-paper` is the configuration of the RMMNet paper; a plain name is what we would fly, tuned on
+//! other recordings with scatter scale and sensor noise inside.
 
 mod known;
 mod matrix;
