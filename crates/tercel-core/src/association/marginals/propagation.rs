@@ -9,7 +9,7 @@ const ROUNDS: usize = 1000;
 const CONVERGED: f64 = 1e-6;
 
 /// Assignments of the surroundings of a row up to which these grow.
-const SURROUNDINGS: usize = 2048;
+const SURROUNDINGS: usize = 8192;
 
 /// The messages of a cluster.
 struct Messages<'a> {
