@@ -170,7 +170,8 @@ fn what_a_study_does_not_take_is_refused_with_the_reason() {
 #[test]
 fn every_study_is_listed_with_its_methods() {
     let list = run(["study", "list"]).succeeded().stdout;
-    for name in ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "autoferry"] {
+    let names = ["atc-test", "atc-hshm", "atc-noise", "atc-missing", "clutter-partial", "clutter-all"];
+    for name in names.into_iter().chain(["clutter-random", "autoferry"]) {
         assert!(list.lines().any(|line| line.starts_with(name)), "{list}");
         assert!(run(["study", "--help"]).stdout.contains(&format!("\n  {name} ")));
     }
