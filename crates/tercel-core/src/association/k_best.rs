@@ -184,7 +184,7 @@ impl KBest {
         for &(row, column, cost) in pairs {
             if row < fixed {
                 settled += if model.columns[row] == Some(column) { cost } else { 0.0 };
-            } else if !self.taken[column] && !(row == fixed && excluded.contains(&Some(column))) {
+            } else if !(self.taken[column] || row == fixed && excluded.contains(&Some(column))) {
                 self.entries.push((row - fixed, column, cost));
             }
         }

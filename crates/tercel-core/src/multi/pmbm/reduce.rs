@@ -109,11 +109,7 @@ impl<B: Clone> Cluster<B> {
             for leaf in self.hypotheses.iter().filter_map(|hypothesis| hypothesis.leaves[number]) {
                 moved[leaf] = Some(0);
             }
-            let mut count = 0;
-            for place in moved.iter_mut().flatten() {
-                *place = count;
-                count += 1;
-            }
+            moved.iter_mut().flatten().zip(0..).for_each(|(place, number)| *place = number);
             let mut used = moved.iter();
             tree.leaves.retain(|_| used.next().is_some_and(Option::is_some));
             for hypothesis in &mut self.hypotheses {
