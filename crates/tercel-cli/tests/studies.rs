@@ -175,9 +175,13 @@ fn every_study_is_listed_with_its_methods() {
         "atc-hshm",
         "atc-noise",
         "atc-missing",
+        "atc-ablation",
         "vehicle",
         "aircraft",
         "extended-scene",
+        "clutter-partial",
+        "clutter-all",
+        "clutter-random",
         "autoferry",
     ] {
         assert!(list.lines().any(|line| line.starts_with(name)), "{list}");

@@ -6,10 +6,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tercel_core::belief::Gaussian;
-use tercel_core::filter::Kalman;
-use tercel_core::motion::ConstantVelocity;
+use tercel_core::filter::{Filter, Imm, Kalman, Transition};
+use tercel_core::motion::{ConstantVelocity, Turn};
 use tercel_core::multi::{
-    Clutter, Detection, NearestNeighbour, NearestNeighbourConfig, Phd, PhdConfig, Scan, Tracker,
+    Clutter, Detection, Jpda, JpdaConfig, MultiBernoulli, MultiBernoulliConfig, NearestNeighbour,
+    NearestNeighbourConfig, Phd, PhdConfig, Pmbm, PmbmConfig, Scan, Tracker,
 };
 use tercel_core::sensor::{Measurement, Position};
 
@@ -60,6 +61,15 @@ fn scene(objects: usize, clutter: usize, scans: usize) -> Scene {
 
 /// One scan, after a tracker has seen those before it.
 fn one_scan<T: Tracker<Belief = Gaussian<4>> + Clone>(bencher: Bencher, scene: &Scene, tracker: T) {
+    one_scan_by(bencher, scene, &scene.filter, tracker);
+}
+
+/// The same with a filter of choice.
+fn one_scan_by<F, T>(bencher: Bencher, scene: &Scene, filter: &F, tracker: T)
+where
+    F: Filter<4, Measurement = Measurement<2>>,
+    T: Tracker<Belief = F::Belief> + Clone,
+{
     let step = |tracker: &mut T, number: usize| {
         let scan = Scan {
             time: number as f64,
@@ -67,7 +77,7 @@ fn one_scan<T: Tracker<Belief = Gaussian<4>> + Clone>(bencher: Bencher, scene: &
             detection: &scene.detection,
             clutter: &scene.clutter,
         };
-        tracker.step(&scene.filter, &scan).unwrap();
+        tracker.step(filter, &scan).unwrap();
     };
     let last = scene.scans.len() - 1;
     let mut warm = tracker;
@@ -99,4 +109,40 @@ fn nearest_neighbour_objects_and_clutter(bencher: Bencher, objects: usize) {
 fn phd_objects_and_clutter(bencher: Bencher, objects: usize) {
     let config = PhdConfig { cap: 20 * objects, ..PhdConfig::default() };
     one_scan(bencher, &scene(objects, objects, 10), Phd::new(config).unwrap());
+}
+
+/// Six modes: calm, turns to either side at two rates, agile.
+fn bank() -> Imm<Kalman<Turn, Position<2>>> {
+    let rates = [(0.0, 0.05), (5.0, 0.16), (-5.0, 0.16), (10.0, 0.16), (-10.0, 0.16), (0.0, 4.0)];
+    let radar = Position::new(5.0).unwrap();
+    let mode = |(rate, density): (f64, f64)| {
+        Kalman::new(Turn::new(rate.to_radians(), density).with_speed(20.0), radar)
+    };
+    Imm::new(rates.map(mode), Transition::sticky(0.95).per(1.0)).unwrap()
+}
+
+#[divan::bench]
+fn imm_jpda_10_objects_40_clutter(bencher: Bencher) {
+    one_scan_by(bencher, &scene(10, 40, 20), &bank(), Jpda::new(JpdaConfig::default()).unwrap());
+}
+
+#[divan::bench]
+fn imm_phd_10_objects_40_clutter(bencher: Bencher) {
+    one_scan_by(bencher, &scene(10, 40, 20), &bank(), Phd::new(PhdConfig::default()).unwrap());
+}
+
+#[divan::bench]
+fn imm_multi_bernoulli_10_objects_40_clutter(bencher: Bencher) {
+    let tracker = MultiBernoulli::new(MultiBernoulliConfig::default()).unwrap();
+    one_scan_by(bencher, &scene(10, 40, 20), &bank(), tracker);
+}
+
+#[divan::bench]
+fn imm_pmbm_10_objects_40_clutter(bencher: Bencher) {
+    one_scan_by(bencher, &scene(10, 40, 20), &bank(), Pmbm::new(PmbmConfig::default()).unwrap());
+}
+
+#[divan::bench(sample_count = 10)]
+fn pmbm_300_objects_500_clutter(bencher: Bencher) {
+    one_scan(bencher, &scene(300, 500, 10), Pmbm::new(PmbmConfig::default()).unwrap());
 }

@@ -84,14 +84,18 @@ enum StudyCommand {
 
 const AFTER: &str = "\
 Studies:
-  atc-test     one aircraft that turns, seen by a radar: the published test set
-  atc-hshm     the same at high speed with hard turns
-  atc-noise    errors over the bearing noise of the radar (--set test or hshm)
-  atc-missing  errors over the detection probability of the radar (--set test or hshm)
-  vehicle      one vehicle seen as many points: motion and ellipse (--set backward or forward)
-  aircraft     airliners on recorded tracks, seen as many points (--set course, smoothed or crab)
-  extended-scene  three extended objects that cross among false points
-  autoferry    radar and lidar of a small ferry against the GNSS truth of two boats
+  atc-test         one aircraft that turns, seen by a radar: the published test set
+  atc-hshm         the same at high speed with hard turns
+  atc-noise        errors over the bearing noise of the radar (--set test or hshm)
+  atc-missing      errors over the detection probability of the radar (--set test or hshm)
+  atc-ablation     what the parts of the published ensemble are worth
+  vehicle          one vehicle seen as many points: motion and ellipse (--set backward or forward)
+  aircraft         airliners on recorded tracks, seen as many points (--set course, smoothed or crab)
+  extended-scene   three extended objects that cross among false points
+  clutter-partial  nine objects in dense clutter, two of which manoeuvre
+  clutter-all      six objects in clutter that all manoeuvre at once
+  clutter-random   random scenes of 5 to 12 objects that come, go and manoeuvre in clutter
+  autoferry        radar and lidar of a small ferry against the GNSS truth of two boats
 
 Examples:
   tercel study atc-test --runs 100 --methods imm,imm-paper

@@ -1,7 +1,7 @@
 //! The best assignments, in order.
 
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::BTreeSet;
 
 use super::{AssignmentError, AssignmentSolver};
 
@@ -10,7 +10,8 @@ use super::{AssignmentError, AssignmentSolver};
 /// ## Recursion
 /// The cheapest assignment is solved for. The others differ from it in some row; they are divided by the first such row: those
 /// in which row 1 is other, those in which row 1 is the same and row 2 other, ... The cheapest of each part waits in a queue; the
-/// cheapest of the queue is the next answer, and its part is divided in the same way.
+/// cheapest of the queue is the next answer, and its part is divided in the same way. The dual values of an answer say how much more
+/// each part must cost at least, so that most parts need not be solved for; and no more parts wait than are wanted.
 ///
 /// ## Use it when
 /// the most probable ways to explain a scan are wanted, and how much more probable they are than the rest: hypotheses of
@@ -35,6 +36,8 @@ pub struct KBest {
     entries: Vec<(usize, usize, f64)>,
     misses: Vec<f64>,
     taken: Vec<bool>,
+    /// How much more each row must cost if it changes.
+    bounds: Vec<f64>,
     found: Vec<Ranked>,
 }
 
@@ -73,9 +76,8 @@ impl PartialOrd for Part {
 }
 
 impl Ord for Part {
-    // The heap gives its largest first.
     fn cmp(&self, other: &Self) -> Ordering {
-        other.best.cost.total_cmp(&self.best.cost).then(other.number.cmp(&self.number))
+        self.best.cost.total_cmp(&other.best.cost).then(self.number.cmp(&other.number))
     }
 }
 
@@ -99,15 +101,21 @@ impl KBest {
         }
         let best = self.solver.solve_sparse(pairs, columns, misses)?;
         let first = Ranked { cost: best.cost, columns: best.columns.clone() };
-        let limit = first.cost + excess;
-        let mut queue = BinaryHeap::new();
+        let mut limit = first.cost + excess;
+        let mut queue = BTreeSet::new();
         let mut number = 0;
-        queue.push(Part { best: first, fixed: 0, excluded: Vec::new(), number });
-        while let Some(part) = queue.pop() {
+        queue.insert(Part { best: first, fixed: 0, excluded: Vec::new(), number });
+        while let Some(part) = queue.pop_first() {
             let wanted = k - self.found.len() - 1;
+            if wanted > 0 {
+                self.bound(pairs, columns, misses, &part);
+            }
             for row in part.fixed..misses.len() {
                 if wanted == 0 {
                     break;
+                }
+                if part.best.cost + self.bounds[row] > limit {
+                    continue;
                 }
                 let mut excluded = if row == part.fixed { part.excluded.clone() } else { Vec::new() };
                 excluded.push(part.best.columns[row]);
@@ -116,7 +124,13 @@ impl KBest {
                 };
                 if best.cost <= limit {
                     number += 1;
-                    queue.push(Part { best, fixed: row, excluded, number });
+                    queue.insert(Part { best, fixed: row, excluded, number });
+                }
+                if queue.len() > wanted {
+                    queue.pop_last();
+                }
+                if let (true, Some(worst)) = (queue.len() == wanted, queue.last()) {
+                    limit = limit.min(worst.best.cost);
                 }
             }
             self.found.push(part.best);
@@ -125,6 +139,63 @@ impl KBest {
             }
         }
         Ok(&self.found)
+    }
+
+    /// Finds how much more a part's assignment must cost if a row changes, from the dual values: the least reduced cost of
+    /// the row's other choices. Rounding is allowed for.
+    fn bound(&mut self, pairs: &[(usize, usize, f64)], columns: usize, misses: &[f64], part: &Part) {
+        self.bounds.clear();
+        self.bounds.resize(misses.len(), f64::INFINITY);
+        let fixed = part.fixed;
+        self.restrict(pairs, columns, misses, (&part.best, fixed, &part.excluded));
+        let Ok(rest) = self.solver.solve_sparse(&self.entries, columns, &self.misses) else {
+            self.bounds.fill(0.0);
+            return;
+        };
+        for &(row, column, cost) in &self.entries {
+            if rest.columns[row] != Some(column) {
+                let more = cost - rest.row_duals[row] - rest.column_duals[column];
+                self.bounds[row + fixed] = self.bounds[row + fixed].min(more);
+            }
+        }
+        for (row, miss) in self.misses.iter().enumerate() {
+            if rest.columns[row].is_some() {
+                self.bounds[row + fixed] = self.bounds[row + fixed].min(miss - rest.row_duals[row]);
+            }
+        }
+        let slack = 1e-9 * (1.0 + part.best.cost.abs());
+        self.bounds.iter_mut().for_each(|bound| *bound -= slack);
+    }
+
+    /// Leaves of the problem what is open: the rows from `fixed` on, counted from zero, without the columns that the rows
+    /// before have in the model, and without what row `fixed` must not take. Returns the cost of the rows before.
+    fn restrict(
+        &mut self,
+        pairs: &[(usize, usize, f64)],
+        columns: usize,
+        misses: &[f64],
+        (model, fixed, excluded): (&Ranked, usize, &[Option<usize>]),
+    ) -> f64 {
+        self.taken.clear();
+        self.taken.resize(columns, false);
+        model.columns[..fixed].iter().flatten().for_each(|&column| self.taken[column] = true);
+        self.entries.clear();
+        let mut settled = 0.0;
+        for &(row, column, cost) in pairs {
+            if row < fixed {
+                settled += if model.columns[row] == Some(column) { cost } else { 0.0 };
+            } else if !(self.taken[column] || row == fixed && excluded.contains(&Some(column))) {
+                self.entries.push((row - fixed, column, cost));
+            }
+        }
+        let alone = misses[..fixed].iter().zip(&model.columns).filter(|(_, column)| column.is_none());
+        settled += alone.map(|(miss, _)| miss).sum::<f64>();
+        self.misses.clear();
+        self.misses.extend_from_slice(&misses[fixed..]);
+        if excluded.contains(&None) {
+            self.misses[0] = f64::INFINITY;
+        }
+        settled
     }
 
     /// The cheapest assignment that has the columns of another in the rows before `fixed`, and gives row `fixed` none of what
@@ -136,25 +207,7 @@ impl KBest {
         misses: &[f64],
         (model, fixed, excluded): (&Ranked, usize, &[Option<usize>]),
     ) -> Option<Ranked> {
-        self.taken.clear();
-        self.taken.resize(columns, false);
-        model.columns[..fixed].iter().flatten().for_each(|&column| self.taken[column] = true);
-        self.entries.clear();
-        let (taken, mut settled) = (&self.taken, 0.0);
-        for &(row, column, cost) in pairs {
-            if row < fixed {
-                settled += if model.columns[row] == Some(column) { cost } else { 0.0 };
-            } else if !taken[column] && !(row == fixed && excluded.contains(&Some(column))) {
-                self.entries.push((row - fixed, column, cost));
-            }
-        }
-        let alone = misses[..fixed].iter().zip(&model.columns).filter(|(_, column)| column.is_none());
-        settled += alone.map(|(miss, _)| miss).sum::<f64>();
-        self.misses.clear();
-        self.misses.extend_from_slice(&misses[fixed..]);
-        if excluded.contains(&None) {
-            self.misses[0] = f64::INFINITY;
-        }
+        let settled = self.restrict(pairs, columns, misses, (model, fixed, excluded));
         let rest = self.solver.solve_sparse(&self.entries, columns, &self.misses).ok()?;
         let mut found = model.columns[..fixed].to_vec();
         found.extend_from_slice(&rest.columns);

@@ -23,7 +23,7 @@ mod tests;
 /// ```
 /// which always converge. Where two rows want the same two columns these messages alone err by up to 0.4. So each row is then
 /// looked at together with those that compete with it most: all assignments of these few are enumerated, and only what the
-/// others claim comes from messages.
+/// others claim comes from messages. In a crowd of thousands the messages have to do.
 ///
 /// ## Use it when
 /// an update weighs all associations instead of deciding for one: joint probabilistic data association.

@@ -38,7 +38,8 @@ use update::Candidate;
 /// ```
 /// Each hypothesis is followed by its most probable assignments of the measurements to leaves or new objects, found by
 /// Murty's algorithm, as many as its weight deserves. Leaves of a tree that saw the same last measurement and have come to say the
-/// same are merged, and with them hypotheses that differ in nothing else. Trees that share no measurement and whose choices are
+/// same are merged, and with them hypotheses that differ in nothing else; of two trees that claim one object under different hypotheses the
+/// stronger gets it. Trees that share no measurement and whose choices are
 /// independent are kept in clusters of their own, so the cost grows with how entangled the picture is and not with its size.
 ///
 /// A tree is a track: its number is its label, its existence that of its leaves over all hypotheses, its belief their merger.

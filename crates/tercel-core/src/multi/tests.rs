@@ -291,8 +291,8 @@ fn an_outage_is_survived_by_memory_and_a_thousand_births_a_scan_by_the_caps() {
     let mut pmbm = Pmbm::<Gaussian<4>>::new(config).unwrap();
     let mut member =
         MultiBernoulli::<Gaussian<4>>::new(MultiBernoulliConfig { cap: 300, ..Default::default() }).unwrap();
-    for step in 0..45 {
-        let seen = step < 10 || step >= 40;
+    for step in 0..38 {
+        let seen = step < 4 || step >= 34;
         let plots =
             if seen { plots(&CROSSING, f64::from(step), 0.95, 1000, &mut random) } else { Plots::new() };
         pmbm.step(&filter, &scan(f64::from(step), &plots, &scene)).unwrap();

@@ -9,7 +9,11 @@ const ROUNDS: usize = 1000;
 const CONVERGED: f64 = 1e-6;
 
 /// Assignments of the surroundings of a row up to which these grow.
-const SURROUNDINGS: usize = 2048;
+const SURROUNDINGS: usize = 8192;
+
+/// Pairs of rows that want the same column, up to which the surroundings are looked at. A crowd beyond is no picture of
+/// objects, and would take long.
+const CROWD: usize = 1_000_000;
 
 /// The messages of a cluster.
 struct Messages<'a> {
@@ -28,6 +32,10 @@ pub(super) fn solve(local: &mut Local) {
     messages.converge();
     let plain = messages.probabilities();
     let mut region = Region::new(local);
+    if region.by_column.iter().map(|entries| entries.len() * entries.len()).sum::<usize>() > CROWD {
+        local.result = plain;
+        return;
+    }
     let mut result = vec![0.0; local.entries.len()];
     for row in 0..local.rows {
         region.grow(&messages, &plain, row);

@@ -1,5 +1,5 @@
 use super::*;
-use crate::motion::{AccelerationNoise, ConstantVelocity};
+use crate::motion::{AccelerationNoise, ConstantVelocity, Motion};
 use crate::sensor::{BearingOnly, Position};
 use nalgebra::vector;
 

@@ -13,12 +13,15 @@ const INDEPENDENT: f64 = 1e-3;
 const ALIKE: f64 = 0.1;
 
 impl<B: Clone> Cluster<B> {
-    /// Forgets leaves that hardly exist, and merges those that say the same: leaves of one tree with the same last
-    /// measurement and within the squared distance `limit`.
+    /// Forgets leaves that hardly exist, and merges those that say the same: leaves with the same last measurement and within
+    /// the squared distance `limit`.
     pub fn reduce<const N: usize, F>(&mut self, filter: &F, limit: f64, least: f64)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
+        if limit > 0.0 {
+            self.exchange(filter, limit);
+        }
         for number in 0..self.trees.len() {
             let shares = self.shares(number);
             let mut places = merge_leaves(filter, &mut self.trees[number], &shares, limit);
@@ -31,6 +34,59 @@ impl<B: Clone> Cluster<B> {
             }
         }
         self.unite();
+    }
+
+    /// Gives an object that two trees claim to one of them. Where one tree has a leaf under some hypotheses that another tree has as
+    /// well under others, the hypotheses differ in nothing but which of the two tracks is the object. Under those of the weaker
+    /// the two trees exchange their choices.
+    fn exchange<const N: usize, F>(&mut self, filter: &F, limit: f64)
+    where
+        F: Filter<N, Belief = B> + ?Sized,
+    {
+        let mut claims: BTreeMap<usize, Vec<(f64, usize, usize)>> = BTreeMap::new();
+        for (number, tree) in self.trees.iter().enumerate() {
+            let shares = self.shares(number);
+            for (leaf, share) in shares.into_iter().enumerate() {
+                if let Some(measurement) = tree.leaves[leaf].measurement {
+                    claims.entry(measurement).or_default().push((share, number, leaf));
+                }
+            }
+        }
+        for claims in claims.values_mut().filter(|claims| claims.len() > 1) {
+            claims.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let (mut share, strong, leaf) = claims[0];
+            for &(other_share, weak, other) in &claims[1..] {
+                let (mine, theirs) = (&self.trees[strong].leaves[leaf], &self.trees[weak].leaves[other]);
+                let alike = weak != strong
+                    && (mine.existence - theirs.existence).abs() < ALIKE
+                    && filter.distance(&mine.belief, &theirs.belief, limit) <= limit;
+                if alike {
+                    let theirs = theirs.clone();
+                    absorb(filter, &mut self.trees[strong].leaves[leaf], share, &theirs, other_share);
+                    share += other_share;
+                    self.swap((strong, leaf), (weak, other));
+                }
+            }
+        }
+    }
+
+    /// Under the hypotheses with the weak tree's leaf, gives the strong tree its own leaf for it, and the weak tree what the
+    /// strong one had.
+    fn swap(&mut self, (strong, leaf): (usize, usize), (weak, other): (usize, usize)) {
+        let mut copies: BTreeMap<usize, usize> = BTreeMap::new();
+        for hypothesis in &mut self.hypotheses {
+            if hypothesis.leaves[weak] != Some(other) {
+                continue;
+            }
+            let before = hypothesis.leaves[strong].replace(leaf);
+            hypothesis.leaves[weak] = before.map(|before| {
+                *copies.entry(before).or_insert_with(|| {
+                    let copy = self.trees[strong].leaves[before].clone();
+                    self.trees[weak].leaves.push(copy);
+                    self.trees[weak].leaves.len() - 1
+                })
+            });
+        }
     }
 
     /// Makes hypotheses with the same choices one, and drops the leaves that nothing chooses.
@@ -53,11 +109,7 @@ impl<B: Clone> Cluster<B> {
             for leaf in self.hypotheses.iter().filter_map(|hypothesis| hypothesis.leaves[number]) {
                 moved[leaf] = Some(0);
             }
-            let mut count = 0;
-            for place in moved.iter_mut().flatten() {
-                *place = count;
-                count += 1;
-            }
+            moved.iter_mut().flatten().zip(0..).for_each(|(place, number)| *place = number);
             let mut used = moved.iter();
             tree.leaves.retain(|_| used.next().is_some_and(Option::is_some));
             for hypothesis in &mut self.hypotheses {

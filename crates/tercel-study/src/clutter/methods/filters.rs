@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector4};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Imm, Kalman, Transition};
+use tercel_core::filter::{Imm, JumpMarkov, Kalman, Particle, Transition};
 use tercel_core::motion::{ConstantVelocity, LinearMotion, Motion, Turn};
 use tercel_core::sensor::Position;
 use tercel_sim::clutter::Sensor;
@@ -33,6 +33,17 @@ pub(super) fn bank(sensor: &Sensor) -> Result<Imm<Kalman<Turn, Position<2>>>, Fi
         Kalman::new(Turn::new(rate.to_radians(), density).with_speed(SPEED), radar)
     };
     Imm::new(BANK.map(mode), Transition::sticky(STAY).per(1.0))
+}
+
+/// Particles of an object.
+const PARTICLES: usize = 500;
+
+/// The modes of [`BANK`] with particles that jump between them. The copies of resampling are spread a little, as the noise of
+/// the calm modes is small.
+pub(super) fn cloud(sensor: &Sensor) -> Result<Particle<JumpMarkov<Turn>, Position<2>>, FilterError> {
+    let mode = |(rate, density): (f64, f64)| Turn::new(rate.to_radians(), density).with_speed(SPEED);
+    let motion = JumpMarkov::new(BANK.map(mode), Transition::sticky(STAY).per(1.0))?;
+    Particle::new(motion, Position::new(sensor.deviation)?, PARTICLES, 1)?.with_smoothing(0.2)
 }
 
 /// The published modes: straight, a turn to the left at 10 °/s, the acceleration of the second scene, with the published
