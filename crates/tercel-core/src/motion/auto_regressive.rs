@@ -115,8 +115,8 @@ impl AutoRegression {
             Kinematics::Backward => self.interval,
             Kinematics::Forward => 0.0,
         };
-        for axis in 0..2 {
-            let variance = self.variance + extra[axis];
+        for (axis, extra) in extra.iter().enumerate() {
+            let variance = self.variance + extra;
             let (p, v) = (axis, 2 + axis);
             belief.covariance[(p, p)] += variance * reach * reach;
             belief.covariance[(p, v)] += variance * reach;

@@ -292,7 +292,7 @@ fn an_outage_is_survived_by_memory_and_a_thousand_births_a_scan_by_the_caps() {
     let mut member =
         MultiBernoulli::<Gaussian<4>>::new(MultiBernoulliConfig { cap: 300, ..Default::default() }).unwrap();
     for step in 0..38 {
-        let seen = step < 4 || step >= 34;
+        let seen = !(4..34).contains(&step);
         let plots =
             if seen { plots(&CROSSING, f64::from(step), 0.95, 1000, &mut random) } else { Plots::new() };
         pmbm.step(&filter, &scan(f64::from(step), &plots, &scene)).unwrap();

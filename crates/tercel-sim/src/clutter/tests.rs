@@ -36,7 +36,7 @@ fn no_object_leaves_the_region() {
 #[test]
 fn what_is_seen_has_the_stated_statistics() {
     let scene = Scenario::Partial.scene(1, 0);
-    let (mut clutter, mut seen, mut square) = (0.0, 0.0, 0.0);
+    let (mut clutter, mut seen, mut square) = (0.0_f64, 0.0_f64, 0.0_f64);
     for run in 0..20 {
         for (step, plots) in scene.observe(5, run).iter().enumerate() {
             for plot in plots {

@@ -54,7 +54,7 @@ pub(super) fn score(recording: &Recording, estimates: &[StepEstimate]) -> Result
         return Err(format!("{} estimates for {} steps", estimates.len(), truth.len()));
     }
     let mut scores = Scores::new(estimates.iter().any(|estimate| estimate.mean.z.is_finite()))?;
-    let mut curves = vec![Vec::with_capacity(truth.len()); 3];
+    let mut curves = vec![Vec::new(); 3];
     for (step, estimate) in estimates.iter().enumerate() {
         let values = scores.take(recording, step, estimate).map_err(|why| format!("step {step}: {why}"))?;
         for (curve, value) in curves.iter_mut().zip(values) {

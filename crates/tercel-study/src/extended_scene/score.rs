@@ -26,7 +26,7 @@ pub(super) fn score(rides: &[Ride], reports: &[Vec<Report>]) -> Result<Outcome, 
     let gospa = Gospa::new(CUTOFF, 1.0).map_err(|error| error.to_string())?;
     let mut sums = [0.0; 4];
     let (mut overlap, mut pairs, mut scans) = (0.0, 0.0, 0.0);
-    let mut curves = vec![Vec::with_capacity(reports.len()); 2];
+    let mut curves = vec![Vec::new(); 2];
     for (step, found) in reports.iter().enumerate() {
         let truth: Vec<[f64; 2]> = rides.iter().map(|ride| ride.ellipse(step).center.into()).collect();
         let places: Vec<[f64; 2]> = found.iter().map(|report| report.place.into()).collect();

@@ -59,7 +59,7 @@ impl Experiment for Dice {
         if run % 7 == 3 {
             moody.metrics[0] = f64::INFINITY;
         }
-        let attempt = |outcome| Attempt::of(3, || Ok(()), |()| Ok(outcome));
+        let attempt = |outcome| Attempt::of(3, || Ok::<_, String>(()), |()| Ok(outcome));
         vec![attempt(plain), attempt(moody)]
     }
 }
