@@ -75,10 +75,9 @@ pub(super) fn moments<const N: usize, G: Borrow<Gaussian<N>>>(
     for (weight, part) in parts {
         let Gaussian { mean, covariance } = part.borrow();
         let difference = mean - merged.mean;
-        let weighted = difference * weight;
-        // Column by column, which needs no matrix in between.
+        // Column by column, which needs no matrix in between; in this order of factors the result is symmetric to the last bit.
         for column in 0..N {
-            let of = covariance.column(column) * weight + difference * weighted[column];
+            let of = covariance.column(column) * weight + difference * difference[column] * weight;
             merged.covariance.column_mut(column).add_assign(&of);
         }
     }
