@@ -25,12 +25,8 @@ macro_rules! files {
 /// Name and content of each file.
 const FILES: &[(&str, &[u8])] = files![
     "att-ens-kalmannets",
-    "att-ens-kalmannets-causal",
     "att-ens-kalmannets-paper",
     "deep-mtt",
-    "ens-knets-classification-paper",
-    "ens-knets-correction-paper",
-    "ens-knets-paper",
     "kalman-net-left",
     "kalman-net-left-paper",
     "kalman-net-right",

@@ -117,16 +117,6 @@ pub(super) fn ensemble(model: &str) -> Result<Box<dyn Method>, StudyError> {
     Ok(Box::new(Learned { filter, measure: stated, read: read_ensemble }))
 }
 
-/// An ensemble that assumes the published noise, but knows the past alone.
-pub(super) fn published_causal_ensemble(model: &str) -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(EnsembleNetwork::from_model(&shipped::model(model)?)?);
-    let filter = EnsKNets::new(network, published_sensor()?)?;
-    let measure = |plot: &Plot, _: &Recording| published_position(plot);
-    let read =
-        |filter: &EnsKNets<_>, belief: &_| StepEstimate { covariance: None, ..read_ensemble(filter, belief) };
-    Ok(Box::new(Learned { filter, measure, read }))
-}
-
 fn read_ensemble<S>(filter: &EnsKNets<S>, belief: &tercel_neural::filter::EnsKNetsBelief) -> StepEstimate
 where
     EnsKNets<S>: Filter<4, Belief = tercel_neural::filter::EnsKNetsBelief>,
@@ -147,9 +137,14 @@ impl PublishedEnsemble {
 
     /// The KalmanNets of the published ensembles without their branches: the mean of their states.
     pub fn average() -> Result<Self, StudyError> {
-        let whole = shipped::model("ens-knets-paper")?;
+        let whole = shipped::model("att-ens-kalmannets-paper")?;
         let network = EnsembleNetwork::from_model(&whole)?;
-        let hyper = EnsKNetsHyper { correction: None, classification: None, ..network.hyper().clone() };
+        let hyper = EnsKNetsHyper {
+            attention: None,
+            correction: None,
+            classification: None,
+            ..network.hyper().clone()
+        };
         let names: BTreeSet<String> = hyper.tensors().into_iter().map(|(name, _)| name).collect();
         let tensors = whole.tensors().iter().filter(|(name, _)| names.contains(*name));
         let tensors = tensors.map(|(name, tensor)| (name.clone(), tensor.clone())).collect();

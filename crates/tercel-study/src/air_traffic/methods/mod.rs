@@ -12,7 +12,6 @@
 //! | `kalman-net` | the radar's accuracy | a learned gain, with our inputs and covariance |
 //! | `kalman-net-paper` | | the same as published |
 //! | `att-ens-kalmannets` | the radar's accuracy | three KalmanNets with attention to innovations; causal |
-//! | `att-ens-kalmannets-causal` | | as published, but with a normalisation that knows the past alone |
 //! | `att-ens-kalmannets-paper` | all plots of the flight | as published: it normalises over the whole flight |
 //! | `mnemonic` | the radar's accuracy | a learned prediction |
 //! | `deep-mtt` | the radar's accuracy | learned residuals of an unscented filter, window of 5 |
@@ -40,7 +39,7 @@ use crate::error::StudyError;
 pub use bank::{AdaptiveBank, Bank};
 
 /// Names of all methods, in the order in which they are best read.
-pub const METHODS: [&str; 19] = [
+pub const METHODS: [&str; 18] = [
     "measurement",
     "ekf",
     "ukf",
@@ -52,7 +51,6 @@ pub const METHODS: [&str; 19] = [
     "kalman-net",
     "kalman-net-paper",
     "att-ens-kalmannets",
-    "att-ens-kalmannets-causal",
     "att-ens-kalmannets-paper",
     "mnemonic",
     "deep-mtt",
@@ -62,14 +60,8 @@ pub const METHODS: [&str; 19] = [
     "oracle",
 ];
 
-/// Names of the methods of the ablation: what the parts of the published ensemble are worth, in the order of the publication.
-pub const ABLATION: [&str; 5] = [
-    "average-paper",
-    "classification-paper",
-    "correction-paper",
-    "ens-knets-paper",
-    "att-ens-kalmannets-paper",
-];
+/// Names of the methods of the ablation: what the branches of the published ensemble are worth.
+pub const ABLATION: [&str; 2] = ["average-paper", "att-ens-kalmannets-paper"];
 
 /// The method of that name, for a population (one of [`NAMES`](tercel_sim::air_traffic::NAMES), of which only `bayes` makes use).
 ///
@@ -88,18 +80,12 @@ pub fn method(name: &str, population: &AirTraffic) -> Result<Box<dyn Method>, St
         "kalman-net" => learned::kalman_net()?,
         "kalman-net-paper" => learned::kalman_net_paper()?,
         "att-ens-kalmannets" => learned::ensemble("att-ens-kalmannets")?,
-        "att-ens-kalmannets-causal" => learned::published_causal_ensemble("att-ens-kalmannets-causal")?,
         "att-ens-kalmannets-paper" => Box::new(learned::PublishedEnsemble::new(name)?),
         "mnemonic" => learned::mnemonic()?,
         "deep-mtt" => learned::deep_mtt()?,
         "tr-mtt" => learned::tr_mtt()?,
         "tr-mtt-window" => Box::new(learned::Windowed::new()?),
         "average-paper" => Box::new(learned::PublishedEnsemble::average()?),
-        "classification-paper" => {
-            Box::new(learned::PublishedEnsemble::new("ens-knets-classification-paper")?)
-        }
-        "correction-paper" => Box::new(learned::PublishedEnsemble::new("ens-knets-correction-paper")?),
-        "ens-knets-paper" => Box::new(learned::PublishedEnsemble::new(name)?),
         "bayes" => Box::new(limits::Bayes::new(population.clone())),
         "oracle" => Box::new(limits::Oracle),
         _ => {
