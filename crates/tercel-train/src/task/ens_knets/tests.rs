@@ -175,7 +175,7 @@ fn the_run_time_says_what_was_trained() {
 fn the_shipped_models_say_what_was_trained() {
     for (model, text) in shipped::of_kind(EnsKNetsKind::NAME) {
         let mut recipe = Recipe::<EnsKNetsKind>::parse(&text).unwrap();
-        (recipe.data.stated, recipe.loss.usual) = (1.0, 1);
+        (recipe.data.stated, recipe.loss.usual, recipe.model.dropout) = (1.0, 1, 0.0);
         let net = |path: &PathBuf| shipped::model(path.file_stem().unwrap().to_str().unwrap());
         let nets: Vec<Model> = recipe.model.nets.iter().map(net).collect();
         let (task, mut set) = EnsKNetsTask::of_nets(&recipe, &nets).unwrap();
