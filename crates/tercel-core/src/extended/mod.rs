@@ -35,7 +35,7 @@ mod symmetric;
 
 pub use aligned::Aligned;
 pub use auto_regressive::{AlignedAutoRegressive, Identified};
-pub use centroid::Centroid;
+pub use centroid::{Centroid, Seen};
 pub use ellipse::Ellipse;
 pub use inverse_wishart::{Freedom, InverseWishart};
 pub use known_size::{KnownSize, Oriented, Pointing};
