@@ -58,6 +58,17 @@ pub struct MonteCarlo {
     build: fn(&Request<'_>) -> Result<Box<dyn Experiment>, StudyError>,
 }
 
+impl MonteCarlo {
+    /// A study with nothing to choose but seed and number of runs.
+    const fn new(
+        seed: u64,
+        runs: u64,
+        build: fn(&Request<'_>) -> Result<Box<dyn Experiment>, StudyError>,
+    ) -> Self {
+        MonteCarlo { seed, runs, sets: &[], options: &[], data: false, build }
+    }
+}
+
 /// Something of which a study has several kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Selection {
@@ -114,39 +125,27 @@ pub const STUDIES: [Study; 12] = [
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
         methods: &air_traffic::methods::METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            seed: air_traffic::SEED,
-            runs: 1000,
-            sets: &[],
-            options: &[],
-            data: false,
-            build: |r| boxed(AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods)),
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::new(air_traffic::SEED, 1000, |r| {
+            boxed(AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods))
+        })),
     },
     Study {
         name: "atc-hshm",
-        about: "the same at high speed with hard turns, outside what was trained on (Table 5)",
+        about: "the same at high speed with hard turns (Table 5)",
         methods: &air_traffic::methods::METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            seed: air_traffic::SEED,
-            runs: 1000,
-            sets: &[],
-            options: &[],
-            data: false,
-            build: |r| boxed(AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods)),
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::new(air_traffic::SEED, 1000, |r| {
+            boxed(AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods))
+        })),
     },
     Study {
         name: "atc-noise",
         about: "errors over the bearing noise of the radar, 0.1 to 1 degrees",
         methods: &air_traffic::methods::METHODS,
         kind: Kind::MonteCarlo(MonteCarlo {
-            seed: air_traffic::SEED,
-            runs: 200,
             sets: &["test", "hshm"],
-            options: &[],
-            data: false,
-            build: |r| boxed(AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods)),
+            ..MonteCarlo::new(air_traffic::SEED, 200, |r| {
+                boxed(AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods))
+            })
         }),
     },
     Study {
@@ -154,41 +153,31 @@ pub const STUDIES: [Study; 12] = [
         about: "errors over the detection probability of the radar, 1 to 0.65",
         methods: &air_traffic::methods::METHODS,
         kind: Kind::MonteCarlo(MonteCarlo {
-            seed: air_traffic::SEED,
-            runs: 200,
             sets: &["test", "hshm"],
-            options: &[],
-            data: false,
-            build: |r| boxed(AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods)),
+            ..MonteCarlo::new(air_traffic::SEED, 200, |r| {
+                boxed(AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods))
+            })
         }),
     },
     Study {
         name: "atc-ablation",
         about: "what the parts of the published ensemble are worth, on validation flights (Table 2)",
         methods: &air_traffic::methods::ABLATION,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            seed: air_traffic::SEED,
-            runs: 1000,
-            sets: &[],
-            options: &[],
-            data: false,
-            build: |r| boxed(AirTrafficExperiment::ablation(r.seed, r.runs, r.methods)),
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::new(air_traffic::SEED, 1000, |r| {
+            boxed(AirTrafficExperiment::ablation(r.seed, r.runs, r.methods))
+        })),
     },
     Study {
         name: "vehicle",
         about: "one vehicle seen as many points: motion and ellipse (RMMNet paper, Table I)",
         methods: &extended::methods::VEHICLE_METHODS,
         kind: Kind::MonteCarlo(MonteCarlo {
-            seed: extended::SEED,
-            runs: 40,
             sets: &["backward", "forward"],
             options: &[
                 Selection { name: "generator", values: &["reject", "l1", "smooth"] },
                 Selection { name: "sizes", values: &["fixed", "random"] },
             ],
-            data: false,
-            build: |r| boxed(ExtendedExperiment::vehicle(r)),
+            ..MonteCarlo::new(extended::SEED, 40, |r| boxed(ExtendedExperiment::vehicle(r)))
         }),
     },
     Study {
@@ -196,65 +185,42 @@ pub const STUDIES: [Study; 12] = [
         about: "airliners on recorded tracks, seen as many points (RMMNet paper, Table II)",
         methods: extended::methods::AIRCRAFT_METHODS,
         kind: Kind::MonteCarlo(MonteCarlo {
-            seed: extended::SEED,
-            runs: 52,
             sets: &["course", "smoothed", "crab"],
-            options: &[],
             data: true,
-            build: |r| boxed(ExtendedExperiment::aircraft(r)),
+            ..MonteCarlo::new(extended::SEED, 52, |r| boxed(ExtendedExperiment::aircraft(r)))
         }),
     },
     Study {
         name: "extended-scene",
         about: "three extended objects that cross among false points, in trackers of many objects",
         methods: &extended_scene::METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            seed: extended_scene::SEED,
-            runs: 50,
-            sets: &[],
-            options: &[],
-            data: false,
-            build: |r| boxed(ExtendedSceneExperiment::new(r)),
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::new(extended_scene::SEED, 50, |r| {
+            boxed(ExtendedSceneExperiment::new(r))
+        })),
     },
     Study {
         name: "clutter-partial",
         about: "nine objects in dense clutter, two of which manoeuvre (Figs. 2 and 3)",
         methods: &clutter::methods::METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            seed: clutter::SEED,
-            runs: 100,
-            sets: &[],
-            options: &[],
-            data: false,
-            build: |r| boxed(ClutterExperiment::new("clutter-partial", r.seed, r.runs, r.methods)),
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::new(clutter::SEED, 100, |r| {
+            boxed(ClutterExperiment::new("clutter-partial", r.seed, r.runs, r.methods))
+        })),
     },
     Study {
         name: "clutter-all",
         about: "six objects in clutter that all manoeuvre at once (Figs. 4 and 5)",
         methods: &clutter::methods::METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            seed: clutter::SEED,
-            runs: 100,
-            sets: &[],
-            options: &[],
-            data: false,
-            build: |r| boxed(ClutterExperiment::new("clutter-all", r.seed, r.runs, r.methods)),
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::new(clutter::SEED, 100, |r| {
+            boxed(ClutterExperiment::new("clutter-all", r.seed, r.runs, r.methods))
+        })),
     },
     Study {
         name: "clutter-random",
         about: "random scenes of 5 to 12 objects that come, go and manoeuvre in clutter",
         methods: &clutter::methods::METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            seed: clutter::SEED,
-            runs: 100,
-            sets: &[],
-            options: &[],
-            data: false,
-            build: |r| boxed(ClutterExperiment::new("clutter-random", r.seed, r.runs, r.methods)),
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::new(clutter::SEED, 100, |r| {
+            boxed(ClutterExperiment::new("clutter-random", r.seed, r.runs, r.methods))
+        })),
     },
     Study {
         name: autoferry::NAME,

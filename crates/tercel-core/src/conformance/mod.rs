@@ -228,7 +228,6 @@ macro_rules! conformance {
     };
     (@checks $name:ident, $subject:expr, $($check:ident),* $(,)?) => {
         mod $name {
-            #[allow(unused_imports)]
             use super::*;
             $(
                 #[test]

@@ -7,9 +7,9 @@ pub mod kalman_net;
 pub mod mnemonic;
 pub mod neural_imm;
 pub mod plots;
-pub mod residual;
 #[cfg(test)]
-mod shipped;
+mod repository;
+pub mod residual;
 pub mod tr_mtt;
 
 use std::ops::ControlFlow;

@@ -7,7 +7,7 @@ use tercel_neural::filter::{Architecture, EnsKNets, KalmanNetHyper, OfflineEnsKN
 
 use super::*;
 use crate::backend::{Tape, leaf};
-use crate::task::shipped;
+use crate::task::repository;
 
 /// KalmanNets with random weights beside an alpha-beta filter, for straight flight and turns to both sides.
 fn nets() -> Vec<Model> {
@@ -173,13 +173,13 @@ fn the_run_time_says_what_was_trained() {
 
 #[test]
 fn the_shipped_models_say_what_was_trained() {
-    for (model, text) in shipped::of_kind(EnsKNetsKind::NAME) {
+    for (model, text) in repository::models(EnsKNetsKind::NAME) {
         let mut recipe = Recipe::<EnsKNetsKind>::parse(&text).unwrap();
         (recipe.data.stated, recipe.loss.usual, recipe.model.dropout) = (1.0, 1, 0.0);
-        let net = |path: &PathBuf| shipped::model(path.file_stem().unwrap().to_str().unwrap());
+        let net = |path: &PathBuf| repository::model(path.file_stem().unwrap().to_str().unwrap());
         let nets: Vec<Model> = recipe.model.nets.iter().map(net).collect();
         let (task, mut set) = EnsKNetsTask::of_nets(&recipe, &nets).unwrap();
-        shipped::fill(&mut set, &model);
+        repository::fill(&mut set, &model);
         agree(&task, &set);
     }
 }
@@ -292,16 +292,11 @@ fn recipes_that_make_no_sense_are_refused_by_key() {
 
 #[test]
 fn the_recipes_of_the_repository_can_be_trained() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes");
-    let mut found = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
-        if crate::recipe::kind(&text).unwrap() == EnsKNetsKind::NAME {
-            let mut recipe = Recipe::<EnsKNetsKind>::parse(&text).unwrap();
-            recipe.loss.usual = 1;
-            EnsKNetsTask::of_nets(&recipe, &nets()).unwrap();
-            found += 1;
-        }
+    let recipes = repository::recipes(EnsKNetsKind::NAME);
+    for text in &recipes {
+        let mut recipe = Recipe::<EnsKNetsKind>::parse(text).unwrap();
+        recipe.loss.usual = 1;
+        EnsKNetsTask::of_nets(&recipe, &nets()).unwrap();
     }
-    assert!(found >= 5, "{found}");
+    assert!(recipes.len() >= 5, "{}", recipes.len());
 }

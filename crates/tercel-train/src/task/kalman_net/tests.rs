@@ -9,7 +9,7 @@ use tercel_core::sensor::Position;
 use tercel_neural::filter::KalmanNet;
 
 use super::*;
-use crate::task::shipped;
+use crate::task::repository;
 
 const TWO: &str = "kind = \"architecture-2\"\nin_mult = 2\nout_mult = 3\n";
 const ONE: &str = "kind = \"architecture-1\"\ninput = 12\nhidden = 9\nlayers = 2\nhead = 6\n";
@@ -62,9 +62,9 @@ fn the_model_in_training_equals_the_run_time() {
 
 #[test]
 fn the_shipped_models_equal_the_run_time() {
-    for (model, text) in shipped::of_kind(KalmanNetKind::NAME) {
+    for (model, text) in repository::models(KalmanNetKind::NAME) {
         let (task, mut set) = KalmanNetTask::new(&Recipe::parse(&text).unwrap()).unwrap();
-        shipped::fill(&mut set, &model);
+        repository::fill(&mut set, &model);
         agree(&task, &set, 199, 0);
     }
 }
@@ -332,14 +332,9 @@ fn recipes_that_make_no_sense_are_refused_by_key() {
 
 #[test]
 fn the_recipes_of_the_repository_can_be_trained() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes");
-    let mut found = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
-        if crate::recipe::kind(&text).unwrap() == KalmanNetKind::NAME {
-            KalmanNetTask::new(&Recipe::parse(&text).unwrap()).unwrap();
-            found += 1;
-        }
+    let recipes = repository::recipes(KalmanNetKind::NAME);
+    for text in &recipes {
+        KalmanNetTask::new(&Recipe::parse(text).unwrap()).unwrap();
     }
-    assert!(found >= 2);
+    assert!(recipes.len() >= 2, "{}", recipes.len());
 }

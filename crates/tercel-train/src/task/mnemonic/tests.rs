@@ -2,7 +2,7 @@ use tercel_core::filter::Filter;
 use tercel_neural::filter::{MnemonicKalman, MnemonicNetwork};
 
 use super::*;
-use crate::task::shipped;
+use crate::task::repository;
 
 const RECIPE: &str = "
 version = 1
@@ -51,11 +51,11 @@ fn the_filter_does_what_was_trained() {
 
 #[test]
 fn the_shipped_model_does_what_was_trained() {
-    for (model, text) in shipped::of_kind(MnemonicKind::NAME) {
+    for (model, text) in repository::models(MnemonicKind::NAME) {
         let mut recipe = Recipe::<MnemonicKind>::parse(&text).unwrap();
         recipe.data.steps = 201;
         let (task, mut set) = MnemonicTask::new(&recipe).unwrap();
-        shipped::fill(&mut set, &model);
+        repository::fill(&mut set, &model);
         agree(&task, &set);
     }
 }
@@ -193,24 +193,17 @@ fn impossible_recipes_are_refused_by_key() {
         ("window = 5", "surprise = -1.0", "loss.surprise"),
         ("window = 5", "windows = 5", "windows"),
     ] {
-        let error = Recipe::parse(&RECIPE.replacen(old, new, 1))
-            .and_then(|recipe| MnemonicTask::new(&recipe).map(drop))
-            .unwrap_err()
-            .to_string();
+        let check = |text: &str| MnemonicTask::new(&Recipe::parse(text)?).map(drop);
+        let error = repository::refusal(RECIPE, (old, new), check);
         assert!(error.contains(key), "{error}");
     }
 }
 
 #[test]
 fn the_recipes_of_the_repository_can_be_trained() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes");
-    let mut found = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
-        if crate::recipe::kind(&text).unwrap() == MnemonicKind::NAME {
-            MnemonicTask::new(&Recipe::parse(&text).unwrap()).unwrap();
-            found += 1;
-        }
+    let recipes = repository::recipes(MnemonicKind::NAME);
+    for text in &recipes {
+        MnemonicTask::new(&Recipe::parse(text).unwrap()).unwrap();
     }
-    assert!(found >= 2);
+    assert!(recipes.len() >= 2, "{}", recipes.len());
 }

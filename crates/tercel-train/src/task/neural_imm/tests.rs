@@ -8,7 +8,7 @@ use tercel_sim::air_traffic::AirTraffic;
 
 use super::*;
 use crate::backend::{Tape, leaf};
-use crate::task::shipped;
+use crate::task::repository;
 
 const RECIPE: &str = "
 version = 1
@@ -98,9 +98,9 @@ fn the_filter_says_what_was_trained() {
 
 #[test]
 fn the_shipped_model_says_what_was_trained() {
-    for (model, text) in shipped::of_kind(NeuralImmKind::NAME) {
+    for (model, text) in repository::models(NeuralImmKind::NAME) {
         let (task, mut set) = NeuralImmTask::new(&Recipe::parse(&text).unwrap()).unwrap();
-        shipped::fill(&mut set, &model);
+        repository::fill(&mut set, &model);
         agree(&task, &set, 201);
     }
 }
@@ -143,10 +143,8 @@ fn impossible_recipes_are_refused_by_key() {
         ("rates = [0.0, 0.1, -0.1]", "rates = []", "turn rates"),
         ("steps = 40", "stops = 40", "stops"),
     ] {
-        let error = Recipe::parse(&RECIPE.replacen(old, new, 1))
-            .and_then(|recipe| NeuralImmTask::new(&recipe).map(drop))
-            .unwrap_err()
-            .to_string();
+        let check = |text: &str| NeuralImmTask::new(&Recipe::parse(text)?).map(drop);
+        let error = repository::refusal(RECIPE, (old, new), check);
         assert!(error.contains(key), "{error}");
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::backend::values;
-use crate::task::shipped;
+use crate::task::repository;
 
 const RECIPE: &str = "
 version = 1
@@ -50,11 +50,11 @@ fn the_filter_says_what_was_trained() {
 
 #[test]
 fn the_shipped_model_says_what_was_trained() {
-    for (model, text) in shipped::of_kind(TrMttKind::NAME) {
+    for (model, text) in repository::models(TrMttKind::NAME) {
         let mut recipe = Recipe::<TrMttKind>::parse(&text).unwrap();
         (recipe.data.windows, recipe.data.steps) = (0, 201);
         let (task, mut set) = TrMttTask::new(&recipe).unwrap();
-        shipped::fill(&mut set, &model);
+        repository::fill(&mut set, &model);
         agree(&task, &set);
     }
 }
@@ -152,24 +152,17 @@ fn impossible_recipes_are_refused_by_key() {
         ("steps = 60", "steps = 2", "data.steps"),
         ("speed = 300.0", "speed = 300.0\n[loss]\nlikelihood = -1.0", "loss.likelihood"),
     ] {
-        let error = Recipe::parse(&RECIPE.replacen(old, new, 1))
-            .and_then(|recipe| TrMttTask::new(&recipe).map(drop))
-            .unwrap_err()
-            .to_string();
+        let check = |text: &str| TrMttTask::new(&Recipe::parse(text)?).map(drop);
+        let error = repository::refusal(RECIPE, (old, new), check);
         assert!(error.contains(key), "{error}");
     }
 }
 
 #[test]
 fn the_recipes_of_the_repository_can_be_trained() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes");
-    let mut found = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
-        if crate::recipe::kind(&text).unwrap() == TrMttKind::NAME {
-            TrMttTask::new(&Recipe::parse(&text).unwrap()).unwrap();
-            found += 1;
-        }
+    let recipes = repository::recipes(TrMttKind::NAME);
+    for text in &recipes {
+        TrMttTask::new(&Recipe::parse(text).unwrap()).unwrap();
     }
-    assert!(found >= 2);
+    assert!(recipes.len() >= 2, "{}", recipes.len());
 }
