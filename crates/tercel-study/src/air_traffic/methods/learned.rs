@@ -14,7 +14,7 @@ use tercel_neural::filter::{
 };
 use tercel_neural::{Model, shipped};
 
-use super::bank::{ADAPTIVE_BEARINGS, NOMINAL};
+use super::bank::{ADAPTIVE_BEARINGS, Bank, NOMINAL};
 use super::{Plot, follow, stated};
 use crate::air_traffic::{Method, Recording, StepEstimate};
 use crate::error::StudyError;
@@ -65,6 +65,12 @@ fn published_position(plot: &Plot) -> Measurement<2> {
 
 fn published_sensor() -> Result<tercel_core::sensor::Position, FilterError> {
     tercel_core::sensor::Position::new(PUBLISHED_DEVIATION)
+}
+
+/// `imm-wide`: the bank of `neural-imm` without its network, which tells what the network adds.
+pub(super) fn wide_bank() -> Result<Bank, StudyError> {
+    let network = BankNetwork::from_model(&shipped::model("neural-imm")?)?;
+    Ok(Bank::new(network.hyper().bank()?)?)
 }
 
 /// `neural-imm`: told the accuracy of the radar.

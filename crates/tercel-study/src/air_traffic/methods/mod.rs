@@ -7,7 +7,8 @@
 //! | `imm-paper` | | the published rival: three modes, a position noise of 35 m |
 //! | `imm` | the radar's accuracy | ours: turns to ±20 °/s, polar measurements |
 //! | `imm-adaptive` | | the same when the accuracy is not stated: it is estimated |
-//! | `neural-imm` | the radar's accuracy | ours: a wider bank whose mixture a network corrects |
+//! | `imm-wide` | the radar's accuracy | the bank of `neural-imm` alone: three accelerations for each turn |
+//! | `neural-imm` | the radar's accuracy | ours: this bank, whose mixture a network corrects |
 //! | `neural-imm-adaptive` | | the same when the accuracy is not stated |
 //! | `kalman-net` | the radar's accuracy | a learned gain, with our inputs and covariance |
 //! | `kalman-net-paper` | | the same as published |
@@ -39,13 +40,14 @@ use crate::error::StudyError;
 pub use bank::{AdaptiveBank, Bank};
 
 /// Names of all methods, in the order in which they are best read.
-pub const METHODS: [&str; 18] = [
+pub const METHODS: [&str; 19] = [
     "measurement",
     "ekf",
     "ukf",
     "imm-paper",
     "imm",
     "imm-adaptive",
+    "imm-wide",
     "neural-imm",
     "neural-imm-adaptive",
     "kalman-net",
@@ -75,6 +77,7 @@ pub fn method(name: &str, population: &AirTraffic) -> Result<Box<dyn Method>, St
         "imm-paper" => Box::new(bank::Published::new()?),
         "imm" => Box::new(Bank::shipped()?),
         "imm-adaptive" => Box::new(AdaptiveBank::shipped()?),
+        "imm-wide" => Box::new(learned::wide_bank()?),
         "neural-imm" => learned::neural_imm()?,
         "neural-imm-adaptive" => learned::neural_imm_adaptive()?,
         "kalman-net" => learned::kalman_net()?,
