@@ -3,8 +3,8 @@
 
     docs/figures.py RESULTS
 
-RESULTS/atc-test/study.json is what `tercel study atc-test -o RESULTS/atc-test` wrote; the sweeps over the fast flights
-(`--set hshm`) are in RESULTS/atc-noise-hshm and RESULTS/atc-missing-hshm. Studies that are not there are left as they are.
+Each RESULTS/ANYTHING/study.json is what `tercel study NAME .. -o RESULTS/ANYTHING` wrote. The page of a study has a place for each
+of its commands. Studies that are not there are left as they are.
 """
 
 import json
@@ -15,22 +15,69 @@ import sys
 PAGES = pathlib.Path(__file__).parent / "src"
 
 
+# The metrics of each page's table, by one that tells the kind of study: name, heading, digits, and whether the deviation
+# over runs is shown.
+FAMILIES = {
+    "rmse_all": [
+        ("rmse_all", "rmse_all", 1, True),
+        ("rmse_pos", "rmse_pos, m", 1, True),
+        ("rmse_vel", "rmse_vel, m/s", 1, True),
+        ("accuracy", "accuracy, %", 1, False),
+        ("nees", "nees", 2, False),
+    ],
+    "gwd": [
+        ("rmse_pos", "rmse_pos, m", 3, False),
+        ("rmse_vel", "rmse_vel, m/s", 3, False),
+        ("iou", "iou", 3, False),
+        ("gwd", "gwd, m²", 3, False),
+        ("gwd_shape", "of which shape", 3, False),
+        ("nees_pos", "nees_pos", 2, False),
+        ("lost", "lost", 2, False),
+    ],
+    "gospa": [
+        ("gospa", "gospa, m", 1, True),
+        ("gospa_localisation", "localisation", 1, False),
+        ("gospa_missed", "missed", 1, False),
+        ("gospa_false", "false", 1, False),
+        ("gospa_settled", "settled", 1, False),
+        ("trajectory_gospa", "trajectory", 1, False),
+        ("switches", "switches", 2, False),
+        ("cardinality_error", "cardinality", 2, False),
+        ("iou", "iou", 3, False),
+    ],
+}
+
+# What a study does when it is told nothing; such options are not part of the command above its table.
+DEFAULTS = {"set": ("test", "backward", "course"), "generator": ("reject",), "sizes": ("fixed",)}
+
+
 def cell(figure, digits, deviation=False):
     if not figure or figure["mean"] is None:
         return "–"
+    if abs(figure["mean"]) >= 100:
+        digits = min(digits, 1)
     text = f"{figure['mean']:.{digits}f}"
     return f"{text} ± {figure['std']:.{digits}f}" if deviation else text
 
 
 def single(study):
-    lines = ["| method | rmse_all | rmse_pos, m | rmse_vel, m/s | accuracy, % | nees |", "|---|---|---|---|---|---|"]
+    known = {name for row in study["rows"] for name, figure in row["metrics"].items() if figure}
+    family = next(family for metric, family in FAMILIES.items() if metric in known)
+    columns = [column for column in family if column[0] in known]
+    lines = ["| method | " + " | ".join(heading for _, heading, _, _ in columns) + " |"]
+    lines.append("|---" * (len(columns) + 1) + "|")
     for row in study["rows"]:
-        metrics = row["metrics"]
-        errors = " | ".join(cell(metrics.get(name), 1, True) for name in ("rmse_all", "rmse_pos", "rmse_vel"))
-        nees = metrics.get("nees")
-        digits = 0 if nees and nees["mean"] is not None and nees["mean"] >= 100 else 2
-        lines.append(f"| `{row['method']}` | {errors} | {cell(metrics.get('accuracy'), 1)} | {cell(nees, digits)} |")
+        figures = [cell(row["metrics"].get(name), digits, shown) for name, _, digits, shown in columns]
+        lines.append(f"| `{row['method']}` | " + " | ".join(figures) + " |")
     return lines
+
+
+def command_of(study):
+    command = f"tercel study {study['study']}"
+    for option, chosen in sorted(study.get("options", {}).items()):
+        if option in ("set", "generator", "sizes") and chosen and chosen not in DEFAULTS[option]:
+            command += f" --{option} {chosen}"
+    return command
 
 
 def sweep(study):
@@ -53,9 +100,7 @@ def main(results):
         if not file.exists():
             continue
         study = json.loads(file.read_text())
-        name, chosen = study["study"], study.get("options", {}).get("set")
-        page = PAGES / f"{name}.md"
-        command = f"tercel study {name}" + (f" --set {chosen}" if chosen and chosen != "test" else "")
+        page, command = PAGES / f"{study['study']}.md", command_of(study)
         lines = sweep(study) if any("at" in row for row in study["rows"]) else single(study)
         place = re.compile(rf"(<!-- figures of `{re.escape(command)}`: begin -->\n).*?(<!-- end -->)", re.DOTALL)
         text, count = place.subn(lambda found: found[1] + "\n".join(lines) + "\n" + found[2], page.read_text())

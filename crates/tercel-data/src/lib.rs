@@ -43,7 +43,7 @@ pub use error::{DataError, Place, Spot};
 pub use format::Format;
 pub use import::{ImportOptions, Imported, LeftOut, Source, import};
 pub use metadata::SCHEMA_VERSION;
-pub use npy::{Array, read_npy};
+pub use npy::{Array, read_npy, read_npy_from};
 pub use options::ReadOptions;
 pub use output::AtomicFile;
 pub use read::{

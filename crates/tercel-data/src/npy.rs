@@ -1,5 +1,6 @@
 //! Arrays of numbers in NumPy's file format.
 
+use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -24,16 +25,39 @@ const HELP: &str = "write it again as numpy.save(path, numpy.ascontiguousarray(a
 /// # Errors
 /// When the file cannot be read, is not such a file, or ends early.
 pub fn read_npy(path: impl AsRef<Path>) -> Result<Array, DataError> {
-    let file: Arc<str> = path.as_ref().display().to_string().into();
-    let bytes = std::fs::read(path.as_ref()).map_err(|source| DataError::Io {
-        file: file.clone(),
-        action: "read",
-        source,
-    })?;
+    let name = path.as_ref().display().to_string();
+    let file = std::fs::File::open(path.as_ref()).map_err(|source| unreadable(&name, source))?;
+    read_npy_from(file, &name)
+}
+
+/// The same from any source of bytes; errors call it by this name.
+///
+/// ```
+/// let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+/// let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 2), }\n";
+/// bytes.extend((header.len() as u16).to_le_bytes());
+/// bytes.extend(header.as_bytes());
+/// bytes.extend([1.0_f64, 2.5].map(f64::to_le_bytes).concat());
+///
+/// let array = tercel_data::read_npy_from(bytes.as_slice(), "two numbers")?;
+/// assert_eq!((array.shape, array.values), (vec![1, 2], vec![1.0, 2.5]));
+/// # Ok::<(), tercel_data::DataError>(())
+/// ```
+///
+/// # Errors
+/// When the source cannot be read, is no such array, or ends early.
+pub fn read_npy_from(mut source: impl Read, name: &str) -> Result<Array, DataError> {
+    let mut bytes = Vec::new();
+    source.read_to_end(&mut bytes).map_err(|source| unreadable(name, source))?;
     decode(&bytes).map_err(|problem| {
-        let place = Place { file: file.clone(), spot: Spot::Whole };
+        let place = Place { file: name.into(), spot: Spot::Whole };
         DataError::Corrupt { place, problem, help: HELP }
     })
+}
+
+fn unreadable(name: &str, source: std::io::Error) -> DataError {
+    let file: Arc<str> = name.into();
+    DataError::Io { file, action: "read", source }
 }
 
 fn decode(bytes: &[u8]) -> Result<Array, String> {

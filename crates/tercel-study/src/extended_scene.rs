@@ -1,5 +1,6 @@
 //! The study `extended-scene`: extended objects that cross among false points, in trackers of many objects.
 
+mod example;
 mod methods;
 mod score;
 
@@ -11,7 +12,7 @@ use tercel_sim::extended::{Crossing, CrossingScene, Scatterers};
 use self::methods::{Method, method};
 use self::score::{METRICS, score};
 use crate::StudyError;
-use crate::monte_carlo::{Attempt, Curve, Experiment, Plan, Quantity};
+use crate::monte_carlo::{Attempt, Curve, Example, Experiment, Plan, Quantity};
 use crate::studies::Request;
 
 pub use self::methods::METHODS;
@@ -73,6 +74,18 @@ impl Experiment for ExtendedSceneExperiment {
             Attempt::of(steps, || method.follow(&scene.scans), |reports| score(&scene.rides, &reports))
         };
         self.methods.iter().map(|method| attempt(&**method)).collect()
+    }
+
+    fn example(&self) -> Result<Option<Example>, StudyError> {
+        if self.plan.runs == 0 {
+            return Ok(None);
+        }
+        let scene = self.scene.draw(self.plan.seed, 0);
+        let names = self.plan.methods.iter().zip(&self.methods);
+        let followed: Vec<_> = names
+            .filter_map(|(name, method)| Some((name.as_str(), method.follow(&scene.scans).ok()?)))
+            .collect();
+        example::draw(&scene, format!("Scene 0 of {}", self.plan.study), &followed).map(Some)
     }
 }
 

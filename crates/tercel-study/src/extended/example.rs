@@ -1,19 +1,13 @@
 //! One recording, drawn with the ellipses of every method.
 
-use std::sync::Arc;
-
 use tercel_core::extended::Ellipse;
 use tercel_core::metric::intersection_over_union;
-use tercel_core::multi::Status;
-use tercel_data::table::{Detection, Detections, Noise, Observation, Scan, Track, Tracks, Truth, Truths};
+use tercel_data::table::{Detections, Track, Truths};
 
-use super::{Recording, StepEstimate};
+use super::{Recording, StepEstimate, tables};
 use crate::StudyError;
 use crate::monte_carlo::Example;
 use crate::report::{Chart, Picture};
-
-/// Name of the sensor in the tables.
-const SENSOR: &str = "sensor";
 
 /// Name of the object in the tables.
 const OBJECT: &str = "object";
@@ -28,104 +22,48 @@ pub(super) fn draw(
     title: String,
     followed: &[(&str, Vec<StepEstimate>)],
 ) -> Result<Example, StudyError> {
-    let detections = detections(recording);
-    let truths = truths(recording);
-    let mut all = true_track(recording);
-    let mut tracks = Vec::with_capacity(followed.len());
+    let (detections, truths) = (detections(recording), truths(recording));
+    let mut all: Vec<Track> = tables::ridden(&recording.ride, 0, DRAWN).collect();
+    let mut own = Vec::with_capacity(followed.len());
     for (number, (name, estimates)) in (1..).zip(followed) {
-        let table = tracks_of(recording, estimates, number);
-        all.rows.extend(table.rows.iter().cloned());
-        tracks.push(((*name).to_owned(), table));
+        let rows = rows(recording, estimates, number);
+        all.extend(rows.iter().cloned());
+        own.push(((*name).to_owned(), tables::tracks(rows)));
     }
-    let mut picture = Picture::new(&detections, &all, Some(&truths), &[])?.with_track_name(0, "truth");
+    let mut picture =
+        Picture::new(&detections, &tables::tracks(all), Some(&truths), &[])?.with_track_name(0, "truth");
     for (number, (name, _)) in (1..).zip(followed) {
         picture = picture.with_track_name(number, *name);
     }
     for chart in charts(recording, followed) {
         picture = picture.with_chart(chart);
     }
-    Ok(Example { title, picture, detections, truths, tracks })
+    Ok(Example { title, picture, detections, truths, tracks: own })
 }
 
 fn time(recording: &Recording, step: usize) -> f64 {
     step as f64 * recording.ride.interval()
 }
 
-/// Every point is a detection of its own.
 fn detections(recording: &Recording) -> Detections {
-    let (sensor, object): (Arc<str>, Arc<str>) = (SENSOR.into(), OBJECT.into());
-    let mut id = 0;
-    let scans = recording.scans.iter().take(DRAWN).enumerate().map(|(step, scan)| {
-        let detections = scan.points().iter().map(|point| {
-            id += 1;
-            Detection {
-                id: id - 1,
-                observation: Observation::Position { x: point.x, y: point.y, z: None },
-                noise: Noise::default(),
-                truth: Some(object.clone()),
-            }
-        });
-        let detections = detections.collect();
-        Scan { time: time(recording, step), sensor: sensor.clone(), position: None, detections }
-    });
-    Detections { origin: None, scans: scans.collect() }
-}
-
-fn extent_of(ellipse: &Ellipse) -> [f64; 3] {
-    [ellipse.axes.x, ellipse.axes.y, ellipse.angle]
+    let scans = recording.scans.iter().take(DRAWN).map(|scan| scan.points());
+    tables::detections(recording.ride.interval(), scans, Some(OBJECT))
 }
 
 fn truths(recording: &Recording) -> Truths {
-    let object: Arc<str> = OBJECT.into();
-    let row = |(step, state): (usize, &nalgebra::Vector4<f64>)| Truth {
-        time: time(recording, step),
-        object: object.clone(),
-        position: [state.x, state.y],
-        z: None,
-        velocity: Some([state.z, state.w]),
-        extent: Some(extent_of(&recording.ride.ellipse(step))),
-    };
-    Truths { origin: None, rows: recording.ride.states().iter().take(DRAWN).enumerate().map(row).collect() }
-}
-
-fn row(recording: &Recording, step: usize, track: u64, place: [f64; 2], extent: Option<[f64; 3]>) -> Track {
-    Track {
-        time: time(recording, step),
-        sensor: SENSOR.into(),
-        track,
-        status: Status::Confirmed,
-        existence: 1.0,
-        state: place.to_vec(),
-        covariance: Vec::new(),
-        modes: Vec::new(),
-        extent,
-        detection: None,
-    }
-}
-
-fn table(rows: Vec<Track>) -> Tracks {
-    Tracks { labels: ["x", "y"].map(str::to_owned).to_vec(), rows, ..Tracks::default() }
-}
-
-/// The truth as a track: the picture draws the ellipses of tracks.
-fn true_track(recording: &Recording) -> Tracks {
-    let states = recording.ride.states().iter().take(DRAWN).enumerate();
-    let rows = states.map(|(step, state)| {
-        row(recording, step, 0, [state.x, state.y], Some(extent_of(&recording.ride.ellipse(step))))
-    });
-    table(rows.collect())
+    tables::truths([(OBJECT.to_owned(), &recording.ride)].into_iter(), DRAWN)
 }
 
 fn ellipse(estimate: &StepEstimate) -> Option<Ellipse> {
     Ellipse::from_matrix([estimate.mean.x, estimate.mean.y].into(), &estimate.extent).ok()
 }
 
-fn tracks_of(recording: &Recording, estimates: &[StepEstimate], track: u64) -> Tracks {
+fn rows(recording: &Recording, estimates: &[StepEstimate], track: u64) -> Vec<Track> {
     let rows = estimates.iter().take(DRAWN).enumerate().map(|(step, estimate)| {
-        let extent = ellipse(estimate).as_ref().map(extent_of);
-        row(recording, step, track, [estimate.mean.x, estimate.mean.y], extent)
+        let place = [estimate.mean.x, estimate.mean.y].into();
+        tables::row(time(recording, step), track, place, ellipse(estimate).as_ref())
     });
-    table(rows.collect())
+    rows.collect()
 }
 
 fn charts(recording: &Recording, followed: &[(&str, Vec<StepEstimate>)]) -> Vec<Chart> {

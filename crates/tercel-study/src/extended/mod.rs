@@ -8,6 +8,7 @@ mod recording;
 mod scene;
 mod score;
 mod settings;
+pub(crate) mod tables;
 
 pub use experiment::{ExtendedExperiment, SEED};
 pub use published::{PUBLISHED, PublishedRow};

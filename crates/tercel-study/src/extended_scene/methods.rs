@@ -16,7 +16,8 @@ use tercel_core::extended::{
 use tercel_core::filter::{Filter, Kalman};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::multi::{
-    Clutter, Detection, NearestNeighbour, NearestNeighbourConfig, Phd, PhdConfig, Scan, Status, Tracker,
+    Clutter, Detection, NearestNeighbour, NearestNeighbourConfig, Phd, PhdConfig, Scan, Status, Track,
+    Tracker,
 };
 use tercel_core::sensor::{Measurement, Position};
 use tercel_sim::extended::Crossing;
@@ -29,6 +30,8 @@ pub const METHODS: [&str; 3] = ["giw-phd", "giw-nearest-neighbour", "point-phd"]
 /// A confirmed object after a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Report {
+    /// Number of its track.
+    pub track: u64,
     /// Its centre, m.
     pub place: Vector2<f64>,
     /// Its extent matrix (m²), if the method has one.
@@ -107,9 +110,9 @@ impl Method for Cells {
         let filter = self.filter()?;
         let cells = |scan: &Vec<Vector2<f64>>| distance_partition(scan, DISTANCE);
         type Belief = GaussianInverseWishart<4>;
-        let read = |belief: &Belief| Report {
-            place: Vector2::new(belief.state.mean[0], belief.state.mean[1]),
-            extent: Some(filter.extent_of(belief)),
+        let read = |belief: &Belief| {
+            let place = Vector2::new(belief.state.mean[0], belief.state.mean[1]);
+            (place, Some(filter.extent_of(belief)))
         };
         if self.phd {
             let tracker = Phd::<Belief>::new(PhdConfig::default())?;
@@ -139,22 +142,19 @@ impl Method for Means {
                 .map(|cell: &Points| Measurement::from(cell.mean()))
                 .collect()
         };
-        let read = |belief: &Gaussian<4>| Report {
-            place: Vector2::new(belief.mean[0], belief.mean[1]),
-            extent: None,
-        };
+        let read = |belief: &Gaussian<4>| (Vector2::new(belief.mean[0], belief.mean[1]), None);
         follow(tracker, &filter, &self.sensor, scans, means, read)
     }
 }
 
-/// Runs a tracker over the scans.
+/// Runs a tracker over the scans. Its beliefs are read as a centre and an extent.
 fn follow<T, F, Z>(
     mut tracker: T,
     filter: &F,
     sensor: &Sensor,
     scans: &[Vec<Vector2<f64>>],
     cut: impl Fn(&Vec<Vector2<f64>>) -> Vec<Z>,
-    read: impl Fn(&T::Belief) -> Report,
+    read: impl Fn(&T::Belief) -> (Vector2<f64>, Option<Matrix2<f64>>),
 ) -> Result<Vec<Vec<Report>>, FilterError>
 where
     T: Tracker,
@@ -171,7 +171,11 @@ where
         };
         tracker.step(filter, &scan).map_err(|_| FilterError::NotFinite { what: "a point of the scan" })?;
         let confirmed = tracker.tracks().iter().filter(|track| track.status == Status::Confirmed);
-        reports.push(confirmed.map(|track| read(&track.belief)).collect());
+        let report = |track: &Track<T::Belief>| {
+            let (place, extent) = read(&track.belief);
+            Report { track: track.id, place, extent }
+        };
+        reports.push(confirmed.map(report).collect());
     }
     Ok(reports)
 }
