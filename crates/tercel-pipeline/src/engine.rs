@@ -15,6 +15,7 @@ use tercel_data::table::{self, Scan};
 use crate::PipelineError;
 use crate::config::{self, Config, Estimator, MotionConfig, TrackerConfig};
 use crate::estimator::{Cloud, Mode, Recursion, Rule, Single, Switching};
+use crate::numbered::Numbered;
 use crate::sensors::{self, Kind, Station};
 
 /// What a scan led to.
@@ -124,20 +125,36 @@ where
         measurements: &[Measurement<M>],
     ) -> Result<Outcome, PipelineError> {
         let tracker = &mut self.tracker;
-        let detection = station.detection();
-        let seen =
-            multi::Scan { time: scan.time, measurements, detection: &detection, clutter: &station.clutter };
-        let stepped: Result<Outcome, TrackerError> = self
+        let stepped = self
             .recursion
             .with(sensor, |filter| {
-                tracker.step(filter, &seen)?;
-                let places = measurements.iter().map(|measurement| filter.place(measurement));
-                let uses = places.zip(tracker.uses().iter().copied()).collect();
-                Ok(Outcome { rows: rows(filter, tracker.tracks(), scan), uses })
+                let numbers: Vec<usize> = (0..measurements.len()).collect();
+                follow(tracker, &Numbered { filter, measurements }, station, scan, &numbers)
             })
             .map_err(|error| PipelineError::parameter("motion", &error))?;
         stepped.map_err(|source| PipelineError::Tracker { sensor: scan.sensor.to_string(), source })
     }
+}
+
+/// Takes in one scan, whose measurements the filter knows by their numbers.
+fn follow<T: Tracker, const N: usize>(
+    tracker: &mut T,
+    filter: &dyn Filter<N, Belief = T::Belief, Measurement = usize>,
+    station: &Station,
+    scan: &Scan,
+    numbers: &[usize],
+) -> Result<Outcome, TrackerError> {
+    let detection = station.detection();
+    let seen = multi::Scan {
+        time: scan.time,
+        measurements: numbers,
+        detection: &detection,
+        clutter: &station.clutter,
+    };
+    tracker.step(filter, &seen)?;
+    let places = numbers.iter().map(|number| filter.place(number));
+    let uses = places.zip(tracker.uses().iter().copied()).collect();
+    Ok(Outcome { rows: rows(filter, tracker.tracks(), scan), uses })
 }
 
 impl<R, T, const N: usize> Engine for Runner<R, T, N>
@@ -157,8 +174,8 @@ where
 }
 
 /// The tracks of a tracker as rows of the table.
-fn rows<const N: usize, const M: usize, B: Clone>(
-    filter: &dyn Filter<N, Belief = B, Measurement = Measurement<M>>,
+fn rows<const N: usize, B: Clone>(
+    filter: &dyn Filter<N, Belief = B, Measurement = usize>,
     tracks: &[multi::Track<B>],
     scan: &Scan,
 ) -> Vec<table::Track> {
