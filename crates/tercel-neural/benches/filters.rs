@@ -5,14 +5,17 @@
 #[path = "../tests/untrained/mod.rs"]
 mod untrained;
 
+use std::sync::Arc;
+
 use divan::{Bencher, black_box};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
-use tercel_core::sensor::{ConvertedPolar, Measurement};
+use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
 use tercel_neural::filter::{
-    Architecture, Attention, Covariance, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, Normalisation,
-    Sign,
+    Architecture, Attention, BankNetwork, Covariance, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
+    NeuralImm, Normalisation, Sign,
 };
+use tercel_neural::shipped;
 use untrained::{network, tiny};
 
 fn main() {
@@ -80,4 +83,12 @@ fn att_ens_kalmannets_with_all_options(bencher: Bencher) {
             ..EnsKNetsHyper::att_ens_knets(nets)
         },
     );
+}
+
+/// The model that comes with Tercel, told the accuracy of its radar.
+#[divan::bench]
+fn neural_imm(bencher: Bencher) {
+    let network = BankNetwork::from_model(&shipped::model("neural-imm").unwrap()).unwrap();
+    let radar = RangeBearing::new(50.0, 0.009).unwrap();
+    time(bencher, &NeuralImm::new(Arc::new(network), &[radar]).unwrap());
 }
