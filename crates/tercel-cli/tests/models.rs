@@ -53,7 +53,9 @@ fn models_are_listed_from_their_folder() {
 fn without_a_path_the_models_that_come_with_the_program_are_meant() {
     let folder = tempfile::tempdir().unwrap();
     let verified = run(folder.path(), &["verify"]).succeeded();
-    assert!(verified.stdout.contains("neural-imm: ok (neural-imm neural-imm, "), "{}", verified.stdout);
+    assert!(verified.stdout.contains("neural-imm: ok (neural-imm, "), "{}", verified.stdout);
+    let one = run(folder.path(), &["show", "neural-imm"]).succeeded();
+    assert!(one.stdout.starts_with("# neural-imm: "), "{}", one.stdout);
     let shown = run(folder.path(), &["list", "--json"]).succeeded();
     assert!(shown.stdout.lines().any(|line| line.contains(r#""shipped":"neural-imm""#)), "{}", shown.stdout);
 }

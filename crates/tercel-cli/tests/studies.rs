@@ -89,6 +89,24 @@ fn threads_and_shards_change_nothing() {
 }
 
 #[test]
+fn a_study_replaces_the_tables_of_the_one_before_and_no_other_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mine = folder.path().join("example_mine.csv");
+    std::fs::write(&mine, "mine").unwrap();
+    let chosen =
+        |methods| ["study", "atc-test", "--runs", "2", "--methods", methods, "-o", text(folder.path())];
+    run(chosen("oracle,measurement")).succeeded();
+    run(chosen("ekf")).succeeded();
+    assert_eq!(std::fs::read(&mine).unwrap(), b"mine");
+    let names = files(folder.path());
+    let examples: Vec<_> = names.iter().filter(|name| name.starts_with("example_")).collect();
+    assert_eq!(
+        examples,
+        ["example_detections.csv", "example_ekf.csv", "example_mine.csv", "example_truth.csv"]
+    );
+}
+
+#[test]
 fn a_shard_that_is_there_is_kept_and_another_one_is_not_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let shard = |more: &[&str]| {

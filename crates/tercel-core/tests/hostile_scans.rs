@@ -1,6 +1,8 @@
 //! Scans that no sensor should give, for every filter of extended objects: each ends in a sound belief or in an error that
 //! leaves the belief as it was.
 
+#![allow(clippy::unwrap_used)]
+
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, vector};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -118,7 +120,7 @@ fn multiplicative_errors_survive_them() {
     );
     let particles = MemRbpf::new(motion(), scattering(), axes, 10, 1).unwrap();
     let particles = particles.with_axes_variance(axes).unwrap().with_growth(Vector2::repeat(0.1)).unwrap();
-    survives::<4, _>("MEM-RBPF", particles.clone());
+    survives::<4, _>("MEM-RBPF", particles);
     survives::<4, _>("MEM-RBPF with positions", particles.with_position());
 }
 

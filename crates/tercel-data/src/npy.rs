@@ -26,7 +26,7 @@ const HELP: &str = "write it again as numpy.save(path, numpy.ascontiguousarray(a
 /// When the file cannot be read, is not such a file, or ends early.
 pub fn read_npy(path: impl AsRef<Path>) -> Result<Array, DataError> {
     let name = path.as_ref().display().to_string();
-    let file = std::fs::File::open(path.as_ref()).map_err(|source| unreadable(&name, source))?;
+    let file = std::fs::File::open(path.as_ref()).map_err(|source| failed("open", &name, source))?;
     read_npy_from(file, &name)
 }
 
@@ -48,16 +48,16 @@ pub fn read_npy(path: impl AsRef<Path>) -> Result<Array, DataError> {
 /// When the source cannot be read, is no such array, or ends early.
 pub fn read_npy_from(mut source: impl Read, name: &str) -> Result<Array, DataError> {
     let mut bytes = Vec::new();
-    source.read_to_end(&mut bytes).map_err(|source| unreadable(name, source))?;
+    source.read_to_end(&mut bytes).map_err(|source| failed("read", name, source))?;
     decode(&bytes).map_err(|problem| {
         let place = Place { file: name.into(), spot: Spot::Whole };
         DataError::Corrupt { place, problem, help: HELP }
     })
 }
 
-fn unreadable(name: &str, source: std::io::Error) -> DataError {
+fn failed(action: &'static str, name: &str, source: std::io::Error) -> DataError {
     let file: Arc<str> = name.into();
-    DataError::Io { file, action: "read", source }
+    DataError::Io { file, action, source }
 }
 
 fn decode(bytes: &[u8]) -> Result<Array, String> {
@@ -85,7 +85,9 @@ fn decode(bytes: &[u8]) -> Result<Array, String> {
     let shape = shape.ok_or("its header does not tell a shape")?;
     let count = shape.iter().try_fold(8_usize, |product, size| product.checked_mul(*size));
     if count != Some(data.len()) {
-        return Err(format!("it has {} bytes of data, which the shape {shape:?} does not need", data.len()));
+        let needed = count.map_or("more than fit into memory".to_owned(), |count| count.to_string());
+        let has = data.len();
+        return Err(format!("it has {has} bytes of data; its shape {shape:?} needs {needed}"));
     }
     let values = data.chunks_exact(8).map(|chunk| {
         let mut number = [0; 8];

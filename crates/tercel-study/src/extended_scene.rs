@@ -96,8 +96,15 @@ mod tests {
     #[test]
     fn trackers_of_cells_find_three_crossing_objects_and_their_size() {
         let methods = METHODS.map(str::to_owned);
-        let request =
-            Request { set: "", seed: 11, runs: 1, methods: &methods, options: BTreeMap::new(), data: None };
+        let request = Request {
+            set: "",
+            seed: 11,
+            runs: 1,
+            chosen_runs: true,
+            methods: &methods,
+            options: BTreeMap::new(),
+            data: None,
+        };
         let experiment = ExtendedSceneExperiment::new(&request).unwrap();
         let attempts = experiment.run(0, 0);
         let figures: Vec<_> = attempts.into_iter().map(|attempt| attempt.outcome.unwrap().metrics).collect();

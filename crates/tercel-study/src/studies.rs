@@ -47,7 +47,7 @@ pub enum Kind {
 pub struct MonteCarlo {
     /// The seed unless another is chosen.
     pub seed: u64,
-    /// The number of runs unless another is chosen.
+    /// The number of runs unless another is chosen; at most that, where data have fewer scenes.
     pub runs: u64,
     /// The sets of scenes among which can be chosen, the default first; none when there is nothing to choose.
     pub sets: &'static [&'static str],
@@ -100,6 +100,8 @@ pub(crate) struct Request<'a> {
     pub set: &'a str,
     pub seed: u64,
     pub runs: u64,
+    /// Whether the number of runs was asked for.
+    pub chosen_runs: bool,
     pub methods: &'a [String],
     /// The kinds of everything of which there are several.
     pub options: BTreeMap<String, String>,
@@ -293,7 +295,8 @@ impl Study {
             return Err(self.wrong_data(study.data));
         }
         let seed = choice.seed.unwrap_or(study.seed);
-        let request = Request { set, seed, runs, methods: &methods, options, data };
+        let chosen_runs = choice.runs.is_some();
+        let request = Request { set, seed, runs, chosen_runs, methods: &methods, options, data };
         (study.build)(&request)
     }
 }

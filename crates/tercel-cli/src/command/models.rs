@@ -14,7 +14,7 @@ use crate::output::{print, print_json};
 #[derive(Debug, Subcommand)]
 #[command(after_long_help = AFTER)]
 pub enum ModelsCommand {
-    /// List models with their kind, size, day and validation loss.
+    /// List models with their kind, name, number of parameters and validation loss.
     #[command(after_long_help = LIST_AFTER)]
     List(JsonArguments),
     /// Print the cards of models, and what their tensors are.
@@ -31,7 +31,7 @@ pub enum ModelsCommand {
 /// Which models.
 #[derive(Debug, Args)]
 pub struct ModelArguments {
-    /// Models, or folders that hold them; without any, the models that come with Tercel.
+    /// Files of models, folders that hold them, or names of models that come with Tercel; without any, all of these.
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
 }
@@ -59,6 +59,7 @@ Examples:
 
 const SHOW_AFTER: &str = "\
 Examples:
+  tercel models show neural-imm
   tercel models show my-models/turns.safetensors";
 
 const VERIFY_AFTER: &str = "\
@@ -72,8 +73,8 @@ impl ModelsCommand {
     /// Does it.
     pub fn run(&self, console: &Console) -> Result<(), Failure> {
         match self {
-            ModelsCommand::List(arguments) => arguments.list(),
-            ModelsCommand::Show(arguments) => arguments.show(),
+            ModelsCommand::List(arguments) => arguments.list(console),
+            ModelsCommand::Show(arguments) => arguments.show(console),
             ModelsCommand::Verify(arguments) => arguments.verify(console),
         }
     }
@@ -119,6 +120,11 @@ impl ModelArguments {
         }
         let mut places = Vec::new();
         for path in &self.paths {
+            let named = shipped::NAMES.iter().find(|name| path.as_os_str() == **name);
+            if let (Some(name), false) = (named, path.exists()) {
+                places.push(Place::Shipped(name));
+                continue;
+            }
             if !path.is_dir() {
                 places.push(Place::File(path.clone()));
                 continue;
@@ -134,12 +140,19 @@ impl ModelArguments {
         Ok(places)
     }
 
-    fn verify(&self, console: &Console) -> Result<(), Failure> {
+    /// Reads every model and does something with it. Those that cannot be used are named, and do not keep the others back.
+    fn each(
+        &self,
+        console: &Console,
+        read: impl Fn(&Place) -> Result<Model, Failure>,
+        mut work: impl FnMut(&Place, &Model) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let places = self.places()?;
         let mut bad = 0;
         for place in &places {
-            match place.verified() {
-                Ok(model) => print(&format!("{}: ok ({})\n", place.name(), described(&model)))?,
+            match read(place) {
+                Ok(model) => work(place, &model)?,
+                Err(failure) if places.len() == 1 => return Err(failure),
                 Err(failure) => {
                     console.fail(&failure);
                     bad += 1;
@@ -151,31 +164,31 @@ impl ModelArguments {
             _ => Err(Failure::input(format!("{bad} of {} models cannot be used", places.len()))),
         }
     }
+
+    fn verify(&self, console: &Console) -> Result<(), Failure> {
+        self.each(console, Place::verified, |place, model| {
+            print(&format!("{}: ok ({})\n", place.name(), described(model)))
+        })
+    }
 }
 
 impl JsonArguments {
-    fn list(&self) -> Result<(), Failure> {
-        let places = self.models.places()?;
-        let width = places.iter().map(|place| place.name().len()).max().unwrap_or(0);
-        for place in &places {
-            let model = place.read()?;
+    fn list(&self, console: &Console) -> Result<(), Failure> {
+        let width = self.models.places()?.iter().map(|place| place.name().len()).max().unwrap_or(0);
+        self.models.each(console, Place::read, |place, model| {
             if self.json {
-                print_json(&as_json(place, &model))?;
-            } else {
-                let loss = model.card().metrics.get("validation_loss");
-                let loss = loss.map(|loss| format!(", validation loss {loss:.6}")).unwrap_or_default();
-                print(&format!("{:width$}  {}{loss}\n", place.name(), described(&model)))?;
+                return print_json(&as_json(place, model));
             }
-        }
-        Ok(())
+            let loss = model.card().metrics.get("validation_loss");
+            let loss = loss.map(|loss| format!(", validation loss {loss:.6}")).unwrap_or_default();
+            print(&format!("{:width$}  {}{loss}\n", place.name(), described(model)))
+        })
     }
 
-    fn show(&self) -> Result<(), Failure> {
-        for place in self.models.places()? {
-            let model = place.read()?;
+    fn show(&self, console: &Console) -> Result<(), Failure> {
+        self.models.each(console, Place::read, |place, model| {
             if self.json {
-                print_json(&as_json(&place, &model))?;
-                continue;
+                return print_json(&as_json(place, model));
             }
             let card = model
                 .card()
@@ -184,10 +197,9 @@ impl JsonArguments {
             let tensors = model.tensors().iter();
             let tensors: String =
                 tensors.map(|(name, tensor)| format!("#   {name} {:?}\n", tensor.shape)).collect();
-            let title = format!("# {}: {} parameters\n", place.name(), parameters(&model));
-            print(&format!("{title}{card}# tensors:\n{tensors}"))?;
-        }
-        Ok(())
+            let title = format!("# {}: {} parameters\n", place.name(), parameters(model));
+            print(&format!("{title}{card}# tensors:\n{tensors}"))
+        })
     }
 }
 
@@ -227,7 +239,7 @@ fn described(model: &Model) -> String {
         "" => String::new(),
         day => format!(", trained {day}"),
     };
-    format!("{} {}, {} parameters{trained}", card.kind, card.name, parameters(model))
+    format!("{}, {} parameters{trained}", card.kind, parameters(model))
 }
 
 fn as_json(place: &Place, model: &Model) -> Value {

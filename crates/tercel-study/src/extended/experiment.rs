@@ -18,6 +18,9 @@ use crate::studies::Request;
 /// The seed of the published tables. It is reserved: nothing is tuned or trained on recordings of this seed.
 pub const SEED: u64 = 7919;
 
+/// Tracks on which the publication tests.
+const PUBLISHED_TRACKS: usize = 52;
+
 /// Methods that follow extended objects.
 pub struct ExtendedExperiment {
     plan: Plan,
@@ -39,14 +42,6 @@ impl ExtendedExperiment {
         (seed, runs): (u64, u64),
         names: &[String],
     ) -> Result<Self, StudyError> {
-        if let Scene::Aircraft(aircraft) = &scene
-            && runs > aircraft.count() as u64
-        {
-            let count = aircraft.count();
-            return Err(StudyError::Option(format!(
-                "there are {count} tracks to test on; expected at most {count} runs"
-            )));
-        }
         let methods = names.iter().map(|name| method(study, name, settings)).collect::<Result<_, _>>()?;
         let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
             name: name.to_owned(),
@@ -96,11 +91,27 @@ impl ExtendedExperiment {
         };
         // The study asks for data before it is built.
         let path = request.data.unwrap_or(std::path::Path::new(""));
-        let scene = Scene::Aircraft(Aircraft::read(path, heading, true)?);
+        let aircraft = Aircraft::read(path, heading, true)?;
+        let count = aircraft.count() as u64;
+        if request.chosen_runs && request.runs > count {
+            let runs = request.runs;
+            return Err(StudyError::Option(format!(
+                "there are {count} tracks to test on, too few for {runs} runs"
+            )));
+        }
         let set = ("set".to_owned(), request.set.to_owned());
         let data = ("data".to_owned(), path.display().to_string());
-        let drawn = (request.seed, request.runs);
+        let drawn = (request.seed, request.runs.min(count));
+        let scene = Scene::Aircraft(aircraft);
         Self::new("aircraft", scene, &Settings::AIRCRAFT, [set, data].into(), drawn, request.methods)
+    }
+
+    /// Whether the scenes are those of the publication, as far as it describes them.
+    fn is_published(&self) -> bool {
+        match &self.scene {
+            Scene::Vehicle(_) => self.plan.options.get("sizes").is_none_or(|sizes| sizes == "fixed"),
+            Scene::Aircraft(aircraft) => aircraft.count() == PUBLISHED_TRACKS,
+        }
     }
 
     fn record(&self, run: u64) -> Result<Recording, StudyError> {
@@ -166,7 +177,7 @@ impl Experiment for ExtendedExperiment {
     }
 
     fn published(&self, method: &str, _condition: usize) -> Option<BTreeMap<String, f64>> {
-        PublishedRow::of(method, &self.plan.study).map(PublishedRow::figures)
+        PublishedRow::of(method, &self.plan.study).filter(|_| self.is_published()).map(PublishedRow::figures)
     }
 
     fn sections(&self) -> Vec<Section> {

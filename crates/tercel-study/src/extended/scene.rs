@@ -89,8 +89,13 @@ impl Aircraft {
         }
         let track = |values: &[f64]| values.chunks_exact(4).map(Vector4::from_column_slice).collect();
         let tracks: Vec<Vec<Vector4<f64>>> = array.values.chunks_exact(4 * steps).map(track).collect();
-        let interval = interval_of(&tracks)
-            .ok_or_else(|| refused("its velocities are not differences of its positions".to_owned()))?;
+        let interval = interval_of(&tracks).ok_or_else(|| {
+            refused(format!("its velocities are not differences of its positions; {COLUMNS}"))
+        })?;
+        if !INTERVALS.contains(&interval) {
+            let problem = format!("positions and velocities fit to steps of {interval:.3e} s; {COLUMNS}");
+            return Err(refused(problem));
+        }
         let tuning = count * 4 / 5;
         let tracks = if test { tracks[tuning..].to_vec() } else { tracks[..tuning].to_vec() };
         Ok(Aircraft { tracks, interval, heading })
@@ -113,6 +118,11 @@ impl Aircraft {
         Ok(Ride::new(self.interval, track.clone(), angles, AIRLINER)?)
     }
 }
+
+/// Times between the steps of a track, s. Outside of them the units are others.
+const INTERVALS: std::ops::RangeInclusive<f64> = 0.02..=600.0;
+
+const COLUMNS: &str = "expected x, y in m and vx, vy in m/s, of which each is the way since the step before";
 
 /// The file itself, or the only array in a folder.
 fn file_of(path: &Path) -> Result<PathBuf, StudyError> {

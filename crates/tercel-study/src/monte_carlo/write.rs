@@ -23,14 +23,16 @@ pub fn probe(folder: &Path) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Takes away the example of an earlier study, whose methods may be others.
+/// Takes away the tables of the study that is there and gets replaced, whose methods may be others. Other files stay.
 fn remove_examples(folder: &Path) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(folder)? {
-        let entry = entry?;
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with("example_") && name.ends_with(".csv") {
-            std::fs::remove_file(entry.path())?;
+    let Ok(text) = std::fs::read(folder.join("study.json")) else { return Ok(()) };
+    let Ok(earlier) = serde_json::from_slice::<serde_json::Value>(&text) else { return Ok(()) };
+    let rows = earlier["rows"].as_array().into_iter().flatten();
+    let methods = rows.filter_map(|row| row["method"].as_str());
+    for name in methods.chain(["truth", "detections"]) {
+        match std::fs::remove_file(folder.join(format!("example_{name}.csv"))) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+            _ => {}
         }
     }
     Ok(())

@@ -7,7 +7,7 @@
 //! | `imm-paper` | | the published rival: three modes, a position noise of 35 m |
 //! | `imm` | the radar's accuracy | ours: turns to ±20 °/s, polar measurements |
 //! | `imm-adaptive` | | the same when the accuracy is not stated: it is estimated |
-//! | `imm-wide` | the radar's accuracy | the bank of `neural-imm` alone: three accelerations for each turn |
+//! | `imm-wide` | the radar's accuracy | the bank of `neural-imm` alone: two accelerations for each turn |
 //! | `neural-imm` | the radar's accuracy | ours: this bank, whose mixture a network corrects |
 //! | `neural-imm-adaptive` | | the same when the accuracy is not stated |
 //! | `kalman-net` | the radar's accuracy | a learned gain, with our inputs and covariance |
