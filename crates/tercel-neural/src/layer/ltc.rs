@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::dispatch::{Arithmetic, Kernel, LANES, dispatch};
-use super::synapses::{SynapseWeights, Synapses, steepness};
+use super::synapses::{SynapseWeights, Synapses};
 use super::tangents::Tangents;
 
 /// How the differential equation of an [`Ltc`] is solved.
@@ -139,7 +139,7 @@ impl Ltc {
 
     /// Numbers of scratch space that a step along this many directions needs, for any number of rows.
     pub fn scratch(&self, directions: usize) -> usize {
-        2 * self.input.count().max(self.hidden.count()) + Jets::COUNT * (1 + directions) * self.leak.len()
+        self.input.scratch().max(self.hidden.scratch()) + Jets::COUNT * (1 + directions) * self.leak.len()
     }
 
     /// Moves the memory `[batch, size]` on by the time `elapsed` with the input `[batch, inputs]`. The new memory is the
@@ -185,7 +185,6 @@ struct Step<'a> {
 /// Scratch space of one object. Values and their tangents are rows below each other, all of padded width.
 struct Jets<'a> {
     open: &'a mut [f32],
-    steep: &'a mut [f32],
     /// Pull and leak of the input.
     constant: [&'a mut [f32]; 2],
     /// Pull and leak of all synapses.
@@ -199,16 +198,14 @@ impl<'a> Jets<'a> {
 
     #[inline(always)]
     fn new(layer: &Ltc, rows: usize, scratch: &'a mut [f32]) -> Self {
-        let count = layer.input.count().max(layer.hidden.count());
-        let (open, rest) = scratch.split_at_mut(count);
-        let (steep, mut rest) = rest.split_at_mut(count);
+        let (open, mut rest) = scratch.split_at_mut(layer.input.scratch().max(layer.hidden.scratch()));
         let mut take = || {
             let (piece, after) = std::mem::take(&mut rest).split_at_mut(rows * layer.leak.len());
             rest = after;
             piece
         };
         let (constant, sums) = ([take(), take()], [take(), take()]);
-        Jets { open, steep, constant, sums, neurons: [take(), take(), take()] }
+        Jets { open, constant, sums, neurons: [take(), take(), take()] }
     }
 }
 
@@ -249,47 +246,21 @@ impl Ltc {
     /// Pull and leak of the input, with tangents.
     #[inline(always)]
     fn listen<A: Arithmetic>(&self, machine: A, input: &[f32], slopes: &[f32], jets: &mut Jets<'_>) {
-        let Jets { open, steep, constant, .. } = jets;
-        let [pull, leak] = constant;
+        let Jets { open, constant: [pull, leak], .. } = jets;
         pull.fill(0.0);
         leak.fill(0.0);
-        self.synapses(machine, (&self.input, input), (slopes, self.inputs()), [open, steep], [pull, leak]);
+        self.input.add(machine, (input, slopes, self.inputs()), open, [pull, leak]);
     }
 
     /// Pull and leak of all synapses at some neurons, with tangents.
     #[inline(always)]
     fn sums<A: Arithmetic>(&self, machine: A, jets: &mut Jets<'_>, stage: usize) {
-        let Jets { open, steep, constant, sums, neurons } = jets;
-        let [pull, leak] = sums;
+        let Jets { open, constant, sums: [pull, leak], neurons } = jets;
         pull.copy_from_slice(constant[0]);
         leak.copy_from_slice(constant[1]);
         let width = self.leak.len();
         let (values, slopes) = neurons[stage].split_at(width);
-        self.synapses(machine, (&self.hidden, values), (slopes, width), [open, steep], [pull, leak]);
-    }
-
-    #[inline(always)]
-    fn synapses<A: Arithmetic>(
-        &self,
-        machine: A,
-        (synapses, values): (&Synapses, &[f32]),
-        (slopes, stride): (&[f32], usize),
-        [open, steep]: [&mut [f32]; 2],
-        [pull, leak]: [&mut [f32]; 2],
-    ) {
-        let width = self.leak.len();
-        let (open, steep) = (&mut open[..synapses.count()], &mut steep[..synapses.count()]);
-        let (pull, pulls) = pull.split_at_mut(width);
-        let (leak, leaks) = leak.split_at_mut(width);
-        synapses.add(machine, values, open, [pull, leak]);
-        if pulls.is_empty() {
-            return;
-        }
-        steepness(open, steep);
-        let sums = pulls.chunks_exact_mut(width).zip(leaks.chunks_exact_mut(width));
-        for (slopes, (pull, leak)) in slopes.chunks_exact(stride).zip(sums) {
-            synapses.add_tangents(machine, slopes, steep, [pull, leak]);
-        }
+        self.hidden.add(machine, (values, slopes, width), open, [pull, leak]);
     }
 
     /// A step that is implicit in the neuron itself.
@@ -301,8 +272,8 @@ impl Ltc {
         let (values, slopes) = neurons.split_at_mut(width);
         let of_capacitance = &mut stage[..width];
         let per_step = 1.0 / delta;
-        for i in 0..width {
-            of_capacitance[i] = self.capacitance[i] * per_step;
+        for (to, capacitance) in of_capacitance.iter_mut().zip(&self.capacitance) {
+            *to = capacitance * per_step;
         }
         // The sums of the values become their inverse, which the tangents share.
         let (leak, leaks) = leak.split_at_mut(width);

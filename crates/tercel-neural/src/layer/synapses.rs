@@ -27,10 +27,6 @@ pub(super) struct Synapses {
     strength: Vec<Eight>,
     /// `w E`.
     pull: Vec<Eight>,
-    /// `γ w`.
-    steep_strength: Vec<Eight>,
-    /// `γ w E`.
-    steep_pull: Vec<Eight>,
 }
 
 /// The numbers of synapses, each `[senders, receivers]` row by row.
@@ -69,8 +65,6 @@ impl Synapses {
             shift: packed(&|i| -slope[i] * centre[i]),
             strength: packed(&|i| conductance(i)),
             pull: packed(&|i| conductance(i) * reversal[i]),
-            steep_strength: packed(&|i| slope[i] * conductance(i)),
-            steep_pull: packed(&|i| slope[i] * conductance(i) * reversal[i]),
         }
     }
 
@@ -78,73 +72,128 @@ impl Synapses {
         self.senders
     }
 
-    /// Numbers that say how open the synapses are.
-    pub fn count(&self) -> usize {
-        self.slope.len() * LANES
+    /// Numbers of scratch space.
+    pub fn scratch(&self) -> usize {
+        LANES * self.senders
     }
 
-    /// Writes how open the synapses are, and adds their pull and leak. All rows of receivers are padded.
+    /// Adds pull and leak of the synapses to the first rows of `pull` and `leak`, and their tangents to the rows after them:
+    /// one for each tangent of the senders, whose rows are `stride` apart. Rows of receivers are padded.
     #[inline(always)]
     pub fn add<A: Arithmetic>(
         &self,
         machine: A,
-        senders: &[f32],
+        (senders, slopes, stride): (&[f32], &[f32], usize),
         open: &mut [f32],
         [pull, leak]: [&mut [f32]; 2],
     ) {
-        let lanes = open.as_chunks_mut::<LANES>().0;
-        for (block, open) in lanes.chunks_exact_mut(self.senders).enumerate() {
+        let width = self.slope.len() / self.senders;
+        let open = &mut open.as_chunks_mut::<LANES>().0[..self.senders];
+        let (pull, leak) = (pull.as_chunks_mut::<LANES>().0, leak.as_chunks_mut::<LANES>().0);
+        for block in 0..width {
             let own = block * self.senders..(block + 1) * self.senders;
-            let synapses = self.slope[own.clone()].iter().zip(&self.shift[own]);
+            let synapses = self.slope[own.clone()].iter().zip(&self.shift[own.clone()]);
             for ((open, sender), (slope, shift)) in open.iter_mut().zip(senders).zip(synapses) {
                 let level = machine.gather(machine.splat(*sender), &slope.0, machine.load(&shift.0));
                 *open = machine.numbers(level);
             }
-        }
-        sigmoid_pass::<A>(lanes.as_flattened_mut());
-        let receivers = pull.as_chunks_mut::<LANES>().0.iter_mut().zip(leak.as_chunks_mut::<LANES>().0);
-        for (block, (pull, leak)) in receivers.enumerate() {
-            let own = block * self.senders..(block + 1) * self.senders;
-            let (mut n, mut d) = (machine.load(pull), machine.load(leak));
-            let synapses = self.pull[own.clone()].iter().zip(&self.strength[own.clone()]);
-            for (open, (pull, strength)) in lanes[own].iter().zip(synapses) {
-                let open = machine.load(open);
-                n = machine.gather(open, &pull.0, n);
-                d = machine.gather(open, &strength.0, d);
+            sigmoid_pass::<A>(open.as_flattened_mut());
+            let conductances = (&self.pull[own.clone()], &self.strength[own.clone()]);
+            accumulate(machine, open, conductances, (&mut pull[block], &mut leak[block]));
+            if slopes.is_empty() {
+                continue;
             }
-            (*pull, *leak) = (machine.numbers(n), machine.numbers(d));
-        }
-    }
-
-    /// Adds the tangents of pull and leak along a tangent of the senders. `steep` is `s (1 - s)` of the synapses.
-    #[inline(always)]
-    pub fn add_tangents<A: Arithmetic>(
-        &self,
-        machine: A,
-        senders: &[f32],
-        steep: &[f32],
-        [pull, leak]: [&mut [f32]; 2],
-    ) {
-        let steep = steep.as_chunks::<LANES>().0;
-        let receivers = pull.as_chunks_mut::<LANES>().0.iter_mut().zip(leak.as_chunks_mut::<LANES>().0);
-        for (block, (pull, leak)) in receivers.enumerate() {
-            let own = block * self.senders..(block + 1) * self.senders;
-            let (mut n, mut d) = (machine.load(pull), machine.load(leak));
-            let synapses = self.steep_pull[own.clone()].iter().zip(&self.steep_strength[own.clone()]);
-            for ((steep, sender), (pull, strength)) in steep[own].iter().zip(senders).zip(synapses) {
-                let moved = machine.times(machine.load(steep), machine.splat(*sender));
-                n = machine.gather(moved, &pull.0, n);
-                d = machine.gather(moved, &strength.0, d);
+            steepen(machine, &self.slope[own], open);
+            let mut at = width + block;
+            let mut pairs = slopes.chunks_exact(2 * stride);
+            for pair in pairs.by_ref() {
+                let tangents = pair.split_at(stride);
+                let (before, after) = pull.split_at_mut(at + width);
+                let pulls = [&mut before[at], &mut after[0]];
+                let (before, after) = leak.split_at_mut(at + width);
+                let leaks = [&mut before[at], &mut after[0]];
+                accumulate_pair(machine, open, [tangents.0, tangents.1], conductances, (pulls, leaks));
+                at += 2 * width;
             }
-            (*pull, *leak) = (machine.numbers(n), machine.numbers(d));
+            if let last @ [_, ..] = pairs.remainder() {
+                let sums = (&mut pull[at], &mut leak[at]);
+                accumulate_along(machine, open, last, conductances, sums);
+            }
         }
     }
 }
 
-/// Turns how open synapses are into `s (1 - s)`.
+/// `w E` and `w` of the synapses to eight receivers.
+type Conductances<'a> = (&'a [Eight], &'a [Eight]);
+
+/// Adds what open synapses do to eight receivers.
 #[inline(always)]
-pub(super) fn steepness(open: &[f32], steep: &mut [f32]) {
-    for (steep, open) in steep.iter_mut().zip(open) {
-        *steep = *open - *open * *open;
+fn accumulate<A: Arithmetic>(
+    machine: A,
+    open: &[[f32; LANES]],
+    (pull, strength): Conductances<'_>,
+    (to_pull, to_leak): (&mut [f32; LANES], &mut [f32; LANES]),
+) {
+    let (mut n, mut d) = (machine.load(to_pull), machine.load(to_leak));
+    for (open, (pull, strength)) in open.iter().zip(pull.iter().zip(strength)) {
+        let open = machine.load(open);
+        n = machine.gather(open, &pull.0, n);
+        d = machine.gather(open, &strength.0, d);
     }
+    (*to_pull, *to_leak) = (machine.numbers(n), machine.numbers(d));
+}
+
+/// Turns how open synapses are into how fast they open with their senders: `γ s (1 - s)`.
+#[inline(always)]
+fn steepen<A: Arithmetic>(machine: A, slope: &[Eight], open: &mut [[f32; LANES]]) {
+    let one = machine.splat(1.0);
+    for (open, slope) in open.iter_mut().zip(slope) {
+        let s = machine.load(open);
+        let shut = machine.gather(s, &[-1.0; LANES], one);
+        let steep = machine.times(machine.times(s, shut), machine.load(&slope.0));
+        *open = machine.numbers(steep);
+    }
+}
+
+/// Adds what the synapses to eight receivers do along a tangent of their senders.
+#[inline(always)]
+fn accumulate_along<A: Arithmetic>(
+    machine: A,
+    steep: &[[f32; LANES]],
+    senders: &[f32],
+    (pull, strength): Conductances<'_>,
+    (to_pull, to_leak): (&mut [f32; LANES], &mut [f32; LANES]),
+) {
+    let (mut n, mut d) = (machine.load(to_pull), machine.load(to_leak));
+    for ((steep, sender), (pull, strength)) in steep.iter().zip(senders).zip(pull.iter().zip(strength)) {
+        let moved = machine.times(machine.load(steep), machine.splat(*sender));
+        n = machine.gather(moved, &pull.0, n);
+        d = machine.gather(moved, &strength.0, d);
+    }
+    (*to_pull, *to_leak) = (machine.numbers(n), machine.numbers(d));
+}
+
+/// The same along two tangents at once, which reads the synapses once.
+#[inline(always)]
+fn accumulate_pair<A: Arithmetic>(
+    machine: A,
+    steep: &[[f32; LANES]],
+    [one, other]: [&[f32]; 2],
+    (pull, strength): Conductances<'_>,
+    (to_pull, to_leak): ([&mut [f32; LANES]; 2], [&mut [f32; LANES]; 2]),
+) {
+    let mut n = [machine.load(to_pull[0]), machine.load(to_pull[1])];
+    let mut d = [machine.load(to_leak[0]), machine.load(to_leak[1])];
+    let senders = one.iter().zip(other);
+    for ((steep, (one, other)), (pull, strength)) in steep.iter().zip(senders).zip(pull.iter().zip(strength))
+    {
+        let steep = machine.load(steep);
+        let one = machine.times(steep, machine.splat(*one));
+        let other = machine.times(steep, machine.splat(*other));
+        n = [machine.gather(one, &pull.0, n[0]), machine.gather(other, &pull.0, n[1])];
+        d = [machine.gather(one, &strength.0, d[0]), machine.gather(other, &strength.0, d[1])];
+    }
+    let ([pull_one, pull_other], [leak_one, leak_other]) = (to_pull, to_leak);
+    (*pull_one, *pull_other) = (machine.numbers(n[0]), machine.numbers(n[1]));
+    (*leak_one, *leak_other) = (machine.numbers(d[0]), machine.numbers(d[1]));
 }
