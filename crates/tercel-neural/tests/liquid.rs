@@ -118,17 +118,26 @@ fn used(filter: &LiquidKalman<Position<2>>, belief: &LiquidBelief) -> Matrix4<f6
 
 #[test]
 fn the_covariance_is_predicted_with_the_slope_of_the_mean() {
-    let different = forms().into_iter().map(|hyper| {
+    let forms = || {
+        forms().into_iter().map(|mut hyper| {
+            if let Form::Residual(form) = &mut hyper.form {
+                form.acceleration = 40.0;
+            }
+            hyper
+        })
+    };
+    let different = forms().map(|hyper| {
         let jacobian = Derivative::Difference { step: 0.02 };
         (LiquidHyper { jacobian, ..hyper }, 2e-2)
     });
-    for (hyper, tolerance) in forms().into_iter().map(|hyper| (hyper, 2e-3)).chain(different) {
+    for (hyper, tolerance) in forms().map(|hyper| (hyper, 5e-3)).chain(different) {
         let filter = filter(&hyper, 2.5);
         let belief = tracked(&filter, 13, 0.7);
         let (slope, used) = (slope(&filter, &belief, 0.05), used(&filter, &belief));
         let straight = Matrix4::from_fn(|i, j| f64::from(u8::from(i == j || j == i + 2)));
         assert!((slope - straight).norm() > 1e-2, "{hyper:?}: the network has a say");
-        assert!((slope - used).norm() < tolerance, "{hyper:?}: {slope} {used}");
+        let off = (slope - used).norm();
+        assert!(off < tolerance * (1.0 + (slope - straight).norm()), "{hyper:?}: {slope} {used}");
     }
 }
 
@@ -247,30 +256,32 @@ fn a_network_that_overflows_predicts_straight_and_forgets_nothing() {
     tensors.get_mut("output.weight").unwrap().values.fill(f32::MAX);
     tensors.get_mut("output.bias").unwrap().values.fill(f32::MAX);
     let network = Arc::new(LiquidNetwork::from_model(&model(&hyper, tensors)).unwrap());
-    let (ours, zero) = (LiquidKalman::new(network, Position::new(5.0).unwrap()), filter(&hyper, 0.0));
-    assert_eq!(ours.state(&tracked(&ours, 20, 0.4)), zero.state(&tracked(&zero, 20, 0.4)));
+    let ours = LiquidKalman::new(network, Position::new(5.0).unwrap());
+    let straight = filter(&LiquidHyper { warm_up: 1000, ..hyper }, 1.0);
+    let found = tracked(&ours, 20, 0.4);
+    assert_eq!(ours.state(&found), straight.state(&tracked(&straight, 20, 0.4)));
+    assert!(found.memory().iter().all(|value| *value == 0.0));
 }
 
 #[test]
 fn as_published_there_is_no_memory_and_the_next_state_is_said_within_limits() {
     let hyper = paper_liquid();
-    let Form::Absolute(Absolute { minimum, maximum, noise }) = hyper.form else { panic!("not as published") };
-    let filter = filter(&hyper, 1.0);
+    let Form::Absolute(Absolute { minimum, noise, .. }) = hyper.form else { panic!("not as published") };
+    let (filter, zero) = (filter(&hyper, 1.0), filter(&hyper, 0.0));
     let (one, other) = (tracked(&filter, 7, 0.0), tracked(&filter, 20, 2.0));
     assert!(one.memory().is_empty());
-    // Only the state counts.
-    let run = |belief: &LiquidBelief| {
-        let (mut belief, state) = (belief.clone(), filter.state(&tracked(&filter, 3, 0.0)));
+    let run = |filter: &LiquidKalman<Position<2>>, belief: &LiquidBelief| {
+        let (mut belief, state) = (belief.clone(), filter.state(&tracked(filter, 3, 0.0)));
         filter.set_state(&mut belief, &state);
         filter.predict(&mut belief, 1.0);
         filter.state(&belief)
     };
-    let state = run(&one);
-    assert_eq!(state, run(&other));
-    for i in 0..4 {
-        assert!((minimum[i]..maximum[i]).contains(&state.mean[i]));
-        assert!(state.covariance[(i, i)] >= noise[i]);
-    }
+    // Only the state counts.
+    assert_eq!(run(&filter, &one), run(&filter, &other));
+    // Zero is the lower limit, whatever the state, which leaves nothing of its covariance.
+    let state = run(&zero, &one);
+    assert_eq!(state.mean, Vector4::from(minimum));
+    assert!((state.covariance - Matrix4::from_diagonal(&Vector4::from(noise))).norm() < 1e-9);
 }
 
 fn model(hyper: &LiquidHyper, tensors: BTreeMap<String, Tensor>) -> Model {
