@@ -192,8 +192,8 @@ pub fn liquid(hyper: &LiquidHyper, size: f32) -> Arc<LiquidNetwork> {
 /// One cell of each kind, for the objects of the conformance suite.
 pub const CELLS: [CellShape; 6] = [
     CellShape::Ltc { size: 9, unfolds: 6, solver: Solver::Fused },
-    CellShape::Ltc { size: 6, unfolds: 8, solver: Solver::Euler },
-    CellShape::Ltc { size: 5, unfolds: 3, solver: Solver::RungeKutta },
+    CellShape::Ltc { size: 6, unfolds: 24, solver: Solver::Euler },
+    CellShape::Ltc { size: 5, unfolds: 12, solver: Solver::RungeKutta },
     CellShape::Cfc { size: 7, backbone: 10 },
     CellShape::Gru { size: 8 },
     CellShape::Mlp { size: 6, hidden: 9 },
