@@ -222,17 +222,28 @@ impl Residual {
 
     fn noise(&self, axes: &Axes, outputs: &[f32], span: Span) -> Matrix4<f64> {
         let said = |i: usize| outputs.get(4 + i).map_or(0.0, |said| f64::from(*said));
+        self.spread(axes, [0, 1, 2, 3].map(|i| (LIMIT * (said(i) / LIMIT).tanh()).exp()), span)
+    }
+
+    /// The process noise with these factors of the variances, of position and velocity along and across.
+    fn spread(&self, axes: &Axes, factors: [f64; 4], span: Span) -> Matrix4<f64> {
         let unit = self.noise * self.noise * span.share();
-        let variances = |first: usize, unit: f64| {
-            axes.spread([first, first + 1].map(|i| unit * (LIMIT * (said(i) / LIMIT).tanh()).exp()))
-        };
-        let (position, velocity) = (variances(0, unit * span.dt * span.dt / 12.0), variances(2, unit));
+        let own = unit * span.dt * span.dt / 12.0;
+        let position = axes.spread([own * factors[0], own * factors[1]]);
+        let velocity = axes.spread([unit * factors[2], unit * factors[3]]);
         let mut noise = Matrix4::zeros();
         noise.fixed_view_mut::<2, 2>(0, 0).copy_from(&(position + velocity * (0.25 * span.dt * span.dt)));
         noise.fixed_view_mut::<2, 2>(0, 2).copy_from(&(velocity * (0.5 * span.dt)));
         noise.fixed_view_mut::<2, 2>(2, 0).copy_from(&(velocity * (0.5 * span.dt)));
         noise.fixed_view_mut::<2, 2>(2, 2).copy_from(&velocity);
         noise
+    }
+
+    fn noise_slope(&self, axes: &Axes, said: f64, number: usize, span: Span) -> Matrix4<f64> {
+        let bent = (said / LIMIT).tanh();
+        let mut factors = [0.0; 4];
+        factors[number] = (LIMIT * bent).exp() * (1.0 - bent * bent);
+        self.spread(axes, factors, span)
     }
 }
 
@@ -310,6 +321,27 @@ impl Form {
         match self {
             Form::Residual(form) => form.moved(seen, outputs, tangents, span),
             Form::Absolute(form) => form.moved(outputs, tangents, span),
+        }
+    }
+
+    /// The derivative of the process noise with respect to the logarithm of a variance, of which `number` counts the outputs
+    /// after the fourth: what a training needs. Zero where the network does not say the noise.
+    ///
+    /// # Panics
+    /// When the row is shorter than [`outputs`](Form::outputs).
+    pub fn noise_slope(
+        &self,
+        mean: &Vector4<f64>,
+        outputs: &[f32],
+        number: usize,
+        span: Span,
+    ) -> Matrix4<f64> {
+        match self {
+            Form::Residual(form) if form.learned_noise => {
+                let axes = Axes::new(pair(mean, 2), form.heading);
+                form.noise_slope(&axes, f64::from(outputs[4 + number]), number, span)
+            }
+            _ => Matrix4::zeros(),
         }
     }
 
