@@ -11,6 +11,7 @@ use nalgebra::{Matrix4, Vector2, Vector4};
 use tercel_core::belief::Gaussian;
 use tercel_core::filter::{Extended, Filter};
 use tercel_core::motion::ConstantVelocity;
+use tercel_core::multi::{Clutter, Detection, Phd, PhdConfig, Scan, Status, Tracker};
 use tercel_core::sensor::{Measurement, Position};
 use tercel_neural::filter::{
     Absolute, Derivative, Form, LiquidBelief, LiquidHyper, LiquidKalman, LiquidNetwork, Residual,
@@ -279,6 +280,30 @@ fn as_published_there_is_no_memory_and_the_next_state_is_said_within_limits() {
     let state = run(&zero, &one);
     assert_eq!(state.mean, Vector4::from(minimum));
     assert!((state.covariance - Matrix4::from_diagonal(&Vector4::from(noise))).norm() < 1e-9);
+}
+
+#[test]
+fn a_mixture_of_objects_is_followed() {
+    let filter = filter(&small_liquid(CELLS[0]), 0.3);
+    let (detection, clutter) = (Detection::uniform(0.95).unwrap(), Clutter::per_scan(10.0, 1e6).unwrap());
+    let mut phd = Phd::<LiquidBelief>::new(PhdConfig::default()).unwrap();
+    for second in 0..20 {
+        let time = f64::from(second);
+        let measurements =
+            [[10.0 * time, 0.0], [500.0 - 8.0 * time, 300.0], [-400.0, 12.0 * time]].map(Measurement::from);
+        phd.step(
+            &filter,
+            &Scan { time, measurements: &measurements, detection: &detection, clutter: &clutter },
+        )
+        .unwrap();
+    }
+    let confirmed = phd.tracks().iter().filter(|track| track.status == Status::Confirmed);
+    let mut places: Vec<_> = confirmed.map(|track| filter.state(&track.belief).mean.xy()).collect();
+    places.sort_by(|a, b| a.x.total_cmp(&b.x));
+    for (place, (x, y)) in places.iter().zip([(-400.0, 228.0), (190.0, 0.0), (348.0, 300.0)]) {
+        assert!((place - Vector2::new(x, y)).norm() < 10.0, "{places:?}");
+    }
+    assert_eq!(places.len(), 3);
 }
 
 fn model(hyper: &LiquidHyper, tensors: BTreeMap<String, Tensor>) -> Model {

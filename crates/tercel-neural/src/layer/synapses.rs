@@ -134,13 +134,22 @@ fn accumulate<A: Arithmetic>(
     (pull, strength): Conductances<'_>,
     (to_pull, to_leak): (&mut [f32; LANES], &mut [f32; LANES]),
 ) {
-    let (mut n, mut d) = (machine.load(to_pull), machine.load(to_leak));
+    // Two sums of each kind, so that one need not wait for the other.
+    let mut n = [machine.load(to_pull), machine.splat(0.0)];
+    let mut d = [machine.load(to_leak), machine.splat(0.0)];
+    let ((open, last), (pull, last_pull)) = (open.as_chunks::<2>(), pull.as_chunks::<2>());
+    let (strength, last_strength) = strength.as_chunks::<2>();
     for (open, (pull, strength)) in open.iter().zip(pull.iter().zip(strength)) {
-        let open = machine.load(open);
-        n = machine.gather(open, &pull.0, n);
-        d = machine.gather(open, &strength.0, d);
+        let open = [machine.load(&open[0]), machine.load(&open[1])];
+        n = [machine.gather(open[0], &pull[0].0, n[0]), machine.gather(open[1], &pull[1].0, n[1])];
+        d = [machine.gather(open[0], &strength[0].0, d[0]), machine.gather(open[1], &strength[1].0, d[1])];
     }
-    (*to_pull, *to_leak) = (machine.numbers(n), machine.numbers(d));
+    for (open, (pull, strength)) in last.iter().zip(last_pull.iter().zip(last_strength)) {
+        let open = machine.load(open);
+        (n[0], d[0]) = (machine.gather(open, &pull.0, n[0]), machine.gather(open, &strength.0, d[0]));
+    }
+    *to_pull = machine.numbers(machine.gather(n[1], &[1.0; LANES], n[0]));
+    *to_leak = machine.numbers(machine.gather(d[1], &[1.0; LANES], d[0]));
 }
 
 /// Turns how open synapses are into how fast they open with their senders: `γ s (1 - s)`.

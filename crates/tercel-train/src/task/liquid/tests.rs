@@ -317,20 +317,27 @@ fn measurements_stop_for_some_steps_and_have_the_errors_that_are_said() {
 }
 
 #[test]
-fn a_training_surprises_less() {
-    let folder = tempfile::tempdir().unwrap();
-    let schedule = "[optimiser]\nrate = 1e-2\n[schedule]\nepochs = 3\nbatch = 8\n";
-    for (text, update) in
-        [(RECIPE.replace("steps = 201", "steps = 40"), "window"), (PAPER.to_owned(), "batch")]
-    {
-        let text = format!("{text}{schedule}update = \"{update}\"\n");
+fn trainings_of_all_forms_lower_their_loss() {
+    let gated = RECIPE
+        .replace("kind = \"ltc\", size = 7, unfolds = 4, solver = \"fused\"", "kind = \"gru\", size = 7");
+    for (text, update) in [(RECIPE.to_owned(), "window"), (gated, "window"), (PAPER.to_owned(), "batch")] {
+        let folder = tempfile::tempdir().unwrap();
+        let data = [
+            ("steps = 201", "steps = 40"),
+            ("training = 8", "training = 96"),
+            ("validation = 4", "validation = 64"),
+        ];
+        let text = data
+            .iter()
+            .fold(text, |text, (old, new)| text.replace(old, new))
+            .replace("window = 5", "window = 20");
+        let schedule = "[optimiser]\nrate = 1e-2\n[schedule]\nepochs = 4\nbatch = 16\n";
         let run = Run::new(folder.path().join("small.safetensors"));
+        let text = format!("{text}{schedule}update = \"{update}\"\n");
         let summary = train(&text, &run, &mut |_| ControlFlow::Continue(())).unwrap();
         let losses: Vec<f64> = summary.curve.iter().filter_map(|row| row.validation).collect();
-        assert!(losses.len() == 3 && losses[2] < losses[0], "{losses:?}");
+        assert!(losses.len() == 4 && losses[3] < losses[0], "{losses:?}");
         tercel_neural::filter::check(&Model::open(&run.model).unwrap()).unwrap();
-        std::fs::remove_dir_all(folder.path()).unwrap();
-        std::fs::create_dir_all(folder.path()).unwrap();
     }
 }
 
