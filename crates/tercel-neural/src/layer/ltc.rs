@@ -39,7 +39,7 @@ pub enum Solver {
 /// them positive.
 ///
 /// ## Use it when
-/// steps have different lengths, or to compare with a [`Gru`](super::Gru) of the same width, which is some thirty times
+/// steps have different lengths, or to compare with a [`Gru`](super::Gru) of the same width, which is some fifteen times
 /// cheaper. Inputs must be of order one: far from `μ` all synapses are shut or open and nothing has a derivative.
 ///
 /// ## Reference
