@@ -10,11 +10,12 @@ use std::sync::Arc;
 use divan::{Bencher, black_box};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
-use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
+use tercel_core::sensor::{ConvertedPolar, Measurement, Position, RangeBearing};
 use tercel_neural::filter::{
-    Architecture, Attention, BankNetwork, Covariance, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
-    NeuralImm, Normalisation, Sign,
+    Architecture, Attention, BankNetwork, Covariance, Derivative, EnsKNets, EnsKNetsHyper, KalmanNet,
+    KalmanNetHyper, LiquidHyper, LiquidKalman, NeuralImm, Normalisation, Sign,
 };
+use tercel_neural::layer::CellShape;
 use tercel_neural::shipped;
 use untrained::{network, tiny};
 
@@ -91,4 +92,23 @@ fn neural_imm(bencher: Bencher) {
     let network = BankNetwork::from_model(&shipped::model("neural-imm").unwrap()).unwrap();
     let radar = RangeBearing::new(50.0, 0.009).unwrap();
     time(bencher, &NeuralImm::new(Arc::new(network), &[radar]).unwrap());
+
+/// The prediction of 500 components of a mixture, with their covariances, by a cell of 32 units.
+#[divan::bench(args = ["ltc", "ltc with differences", "cfc", "gru", "mlp"])]
+fn liquid_predictions_of_500(bencher: Bencher, cell: &str) {
+    let default = LiquidHyper { warm_up: 0, ..LiquidHyper::default() };
+    let hyper = match cell {
+        "ltc" => default,
+        "ltc with differences" => LiquidHyper { jacobian: Derivative::Difference { step: 1e-2 }, ..default },
+        "cfc" => LiquidHyper { cell: CellShape::Cfc { size: 32, backbone: 64 }, ..default },
+        "gru" => LiquidHyper { cell: CellShape::Gru { size: 32 }, ..default },
+        _ => LiquidHyper { cell: CellShape::Mlp { size: 32, hidden: 64 }, ..default },
+    };
+    let filter = LiquidKalman::new(untrained::liquid(&hyper, 1.0), Position::new(5.0).unwrap());
+    let born = |i: i32| filter.birth(&[f64::from(i), 0.5 * f64::from(i)].into()).unwrap();
+    let mut beliefs: Vec<_> = (0..500).map(born).collect();
+    bencher.bench_local(|| {
+        let mut all: Vec<_> = beliefs.iter_mut().collect();
+        filter.predict_all(black_box(&mut all), 1.0);
+    });
 }

@@ -2,7 +2,9 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use tercel_neural::layer::{Gru, Linear, Lstm, activation};
+use tercel_neural::layer::{
+    Cell, Cfc, Gru, Linear, Lstm, Ltc, LtcWeights, Mlp, Solver, SynapseWeights, Tangents, activation,
+};
 
 fn main() {
     divan::main();
@@ -67,4 +69,52 @@ fn pass_over_256(bencher: Bencher, name: &str) {
     };
     let mut x = values(256, 1);
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| pass(black_box(&mut x)));
+}
+
+/// Components of a picture with many objects.
+const COMPONENTS: usize = 500;
+
+/// A cell of 32 units over six inputs.
+fn cell(name: &str) -> Cell {
+    let (inputs, size) = (6, 32);
+    let synapses = |count: usize| [values(count, 1), vec![4.0; count], values(count, 3), values(count, 4)];
+    let (input, hidden) = (synapses(inputs * size), synapses(size * size));
+    fn of(numbers: &[Vec<f32>; 4]) -> SynapseWeights<'_> {
+        let [strength, slope, centre, reversal] = numbers;
+        SynapseWeights { strength, slope, centre, reversal }
+    }
+    let (leak, rest, capacitance) = (&values(size, 5), &values(size, 6), &vec![0.5; size]);
+    let linear =
+        |inputs, outputs| Linear::new(inputs, outputs, &values(inputs * outputs, 7), &values(outputs, 8));
+    match name {
+        "ltc" => {
+            let (input, hidden) = (of(&input), of(&hidden));
+            let weights = LtcWeights { leak, rest, capacitance, input, hidden };
+            Cell::Ltc(Ltc::new(inputs, size, Solver::Fused, 6, weights))
+        }
+        "cfc" => {
+            let (wx, wh, heads) = (values(inputs * 64, 1), values(size * 64, 2), values(64 * 4 * size, 3));
+            Cell::Cfc(Cfc::new(inputs, size, 64, &wx, &wh, &[0.0; 64], &heads, &vec![0.0; 4 * size]))
+        }
+        "gru" => {
+            let (wx, wh) = (values(inputs * 3 * size, 1), values(size * 3 * size, 2));
+            Cell::Gru(Gru::new(inputs, size, &wx, &vec![0.0; 3 * size], &wh, &vec![0.0; 3 * size]))
+        }
+        _ => Cell::Mlp(Mlp::new(linear(inputs, 64), linear(64, size))),
+    }
+}
+
+/// A step of 500 components, with derivatives along two directions (the velocity), along four (the whole state), or none.
+#[divan::bench(args = [("ltc", 0), ("ltc", 2), ("ltc", 4), ("cfc", 2), ("gru", 2), ("mlp", 2)])]
+fn components(bencher: Bencher, (name, directions): (&str, usize)) {
+    let cell = cell(name);
+    let (inputs, size) = (cell.inputs(), cell.size());
+    let x = values(COMPONENTS * inputs, 1);
+    let slopes = values(COMPONENTS * directions * inputs, 2);
+    let (mut memory, mut found) = (vec![0.0; COMPONENTS * size], vec![0.0; COMPONENTS * directions * size]);
+    let mut scratch = vec![0.0; cell.scratch(COMPONENTS, directions)];
+    bencher.bench_local(|| {
+        let tangents = Tangents { directions, input: &slopes, output: &mut found };
+        cell.step_along(1.0, black_box(&x), &mut memory, tangents, &mut scratch);
+    });
 }

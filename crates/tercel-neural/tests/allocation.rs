@@ -10,7 +10,7 @@ use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
 use tercel_neural::filter::{
     Architecture, Covariance, DeepMtt, DeepMttHyper, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
-    MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, TrMtt, TrMttHyper,
+    LiquidKalman, MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, TrMtt, TrMttHyper,
 };
 use untrained::{TINY_ONE, network, tiny};
 
@@ -93,5 +93,14 @@ fn filters_that_learn_the_prediction_or_see_windows_do_not_allocate() {
     }
     for hyper in [untrained::small_tr_mtt(), TrMttHyper { encoder: 1, decoder: 1, ..TrMttHyper::paper() }] {
         assert_eq!(allocations(&TrMtt::new(untrained::tr_mtt(&hyper, 0.1), radar)), 0, "{hyper:?}");
+    }
+}
+
+#[test]
+fn liquid_filters_do_not_allocate() {
+    let radar = RangeBearing::new(50.0, 0.005).unwrap();
+    let hypers = untrained::CELLS.map(untrained::small_liquid).into_iter().chain([untrained::paper_liquid()]);
+    for hyper in hypers {
+        assert_eq!(allocations(&LiquidKalman::new(untrained::liquid(&hyper, 1.0), radar)), 0, "{hyper:?}");
     }
 }

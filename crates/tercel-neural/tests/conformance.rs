@@ -8,8 +8,8 @@ use tercel_core::filter::{Imm, Transition};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
 use tercel_neural::filter::{
-    Architecture, Covariance, DeepMtt, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper, MnemonicKalman,
-    NeuralImm, Normalisation, TrMtt,
+    Architecture, Covariance, DeepMtt, Derivative, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
+    LiquidHyper, LiquidKalman, MnemonicKalman, NeuralImm, Normalisation, TrMtt,
 };
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
@@ -112,5 +112,32 @@ conformance!(
     tr_mtt,
     positions::<4, _, _>(Expectations { moments: None, ..ORDINARY_TIMES }, |p| {
         TrMtt::new(untrained::tr_mtt(&untrained::small_tr_mtt(), 0.3), p.sensor())
+    })
+);
+
+fn liquid(hyper: &LiquidHyper, problem: &Problem) -> LiquidKalman<Position<2>> {
+    LiquidKalman::new(untrained::liquid(hyper, 1.0), problem.sensor())
+}
+
+conformance!(
+    liquid_kalman,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| liquid(&untrained::small_liquid(untrained::CELLS[0]), p))
+);
+conformance!(
+    liquid_kalman_with_a_closed_form_and_differences,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let jacobian = Derivative::Difference { step: 0.1 };
+        liquid(&LiquidHyper { jacobian, ..untrained::small_liquid(untrained::CELLS[3]) }, p)
+    })
+);
+conformance!(
+    gated_kalman,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| liquid(&untrained::small_liquid(untrained::CELLS[4]), p))
+);
+conformance!(
+    imm_of_liquid_kalman_filters,
+    positions::<4, _, _>(ORDINARY_TIMES, |p| {
+        let filters = [0, 5].map(|cell| liquid(&untrained::small_liquid(untrained::CELLS[cell]), p));
+        Imm::new(filters, Transition::sticky(0.95)).unwrap()
     })
 );

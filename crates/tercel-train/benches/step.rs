@@ -183,7 +183,7 @@ mod recipes {
     use super::*;
     use tercel_train::TrainError;
     use tercel_train::recipe::{Kind, Recipe};
-    use tercel_train::task::{deep_mtt, mnemonic, tr_mtt};
+    use tercel_train::task::{deep_mtt, liquid, mnemonic, tr_mtt};
     use tercel_train::trainer::{Draw, Split, Task};
 
     type Made<T> = Result<(T, ParameterSet), TrainError>;
@@ -213,6 +213,10 @@ mod recipes {
         };
     }
 
+    recipe!(liquid, "liquid", liquid::LiquidTask);
+    recipe!(liquid_cfc, "liquid-cfc", liquid::LiquidTask);
+    recipe!(liquid_gru, "liquid-gru", liquid::LiquidTask);
+    recipe!(liquid_paper, "liquid-paper", liquid::LiquidTask);
     recipe!(mnemonic, "mnemonic", mnemonic::MnemonicTask);
     recipe!(mnemonic_full, "mnemonic-full", mnemonic::MnemonicTask);
     recipe!(deep_mtt, "deep-mtt", deep_mtt::DeepMttTask);

@@ -29,6 +29,22 @@ pub enum Initial {
         /// The largest magnitude.
         bound: f32,
     },
+    /// Uniform between two limits.
+    Between {
+        /// The least value.
+        low: f32,
+        /// The greatest value.
+        high: f32,
+    },
+    /// Values whose softplus `ln(1 + eˣ)` is uniform between two limits above 0: for what must be positive.
+    Positive {
+        /// The least softplus.
+        low: f32,
+        /// The greatest softplus.
+        high: f32,
+    },
+    /// 1 or -1.
+    Signs,
     /// Orthonormal rows or columns, in blocks of as many columns as there are rows if it is wide, times a
     /// gain.
     Orthogonal {
@@ -117,14 +133,28 @@ impl ParameterSet {
         random.set_stream(fnv1a(name.as_bytes()));
         let values = match initial {
             Initial::Constant(value) => vec![value; count],
-            Initial::Uniform { bound } => match Uniform::new_inclusive(-bound, bound) {
-                Ok(uniform) => uniform.sample_iter(&mut random).take(count).collect(),
-                Err(_) => {
+            Initial::Uniform { bound } => match between([-bound, bound], count, &mut random) {
+                Some(values) => values,
+                None => {
                     return fault(format!(
                         "the bound of its values is {bound}, but must be finite and positive"
                     ));
                 }
             },
+            Initial::Between { low, high } | Initial::Positive { low, high } => {
+                let values = between([low, high], count, &mut random);
+                match (values, matches!(initial, Initial::Positive { .. })) {
+                    (Some(values), false) => values,
+                    (Some(values), true) if low > 0.0 => {
+                        values.iter().map(|value| value.exp_m1().ln()).collect()
+                    }
+                    _ => return fault(format!("its values cannot lie between {low} and {high}")),
+                }
+            }
+            Initial::Signs => {
+                let signs = between([-1.0, 1.0], count, &mut random).unwrap_or_default();
+                signs.iter().map(|sign| sign.signum()).collect()
+            }
             Initial::Orthogonal { gain } => orthogonal(shape, gain, &mut random),
             Initial::Values(values) if values.len() == count => values,
             Initial::Values(values) => {
@@ -203,6 +233,12 @@ impl ParameterSet {
         }
         Ok(())
     }
+}
+
+/// Uniform values between two limits, if that is possible.
+fn between([low, high]: [f32; 2], count: usize, random: &mut ChaCha8Rng) -> Option<Vec<f32>> {
+    let uniform = Uniform::new_inclusive(low, high).ok()?;
+    Some(uniform.sample_iter(random).take(count).collect())
 }
 
 /// The columns of the Q factor of a Gaussian matrix are uniformly distributed over orthonormal frames, once

@@ -5,6 +5,7 @@
 //! | [`DeepMtt`] | residuals of an unscented filter, from a window | Gaussian, last estimates |
 //! | [`KalmanNet`] | the gain | Gaussian, last differences, memory of a recurrent network |
 //! | [`EnsKNets`] | the mixture of KalmanNets, with or without attention | that of each KalmanNet, memories of two branches |
+//! | [`LiquidKalman`] | the motion, in a network of continuous time or a control | Gaussian, memory of the network |
 //! | [`MnemonicKalman`] | the prediction | Gaussian, memory of a recurrent network |
 //! | [`TrMtt`] | everything, from a window of measurements | last measurements, Gaussian |
 //! | [`NeuralImm`] | the mixture of a bank of turns | that of the bank, memory of a recurrent network |
@@ -16,6 +17,7 @@
 mod deep_mtt;
 mod ens_knets;
 mod kalman_net;
+mod liquid;
 mod memory;
 mod mnemonic;
 mod neural_imm;
@@ -29,6 +31,10 @@ pub use ens_knets::{
 };
 pub use kalman_net::{
     Architecture, Covariance, Feature, GainNetwork, KalmanNet, KalmanNetBelief, KalmanNetHyper,
+};
+pub use liquid::{
+    Absolute, Derivative, Form, LiquidBelief, LiquidHyper, LiquidKalman, LiquidNetwork, Moved, Predictions,
+    Residual, Seen, Span,
 };
 pub use memory::Memory;
 pub use mnemonic::{MnemonicBelief, MnemonicHyper, MnemonicKalman, MnemonicNetwork};
@@ -45,7 +51,8 @@ use crate::model::Model;
 const LABELS: [&str; 4] = ["x", "y", "vx", "vy"];
 
 /// The kinds of models that there are filters for.
-pub const KINDS: [&str; 6] = ["deep-mtt", "ens-knets", "kalman-net", "mnemonic", "neural-imm", "tr-mtt"];
+pub const KINDS: [&str; 7] =
+    ["deep-mtt", "ens-knets", "kalman-net", "liquid", "mnemonic", "neural-imm", "tr-mtt"];
 
 /// Accepts a model of which a filter can be made.
 ///
@@ -56,6 +63,7 @@ pub fn check(model: &Model) -> Result<(), ModelError> {
         "deep-mtt" => ResidualNetwork::from_model(model).map(drop),
         "ens-knets" => EnsembleNetwork::from_model(model).map(drop),
         "kalman-net" => GainNetwork::from_model(model).map(drop),
+        "liquid" => LiquidNetwork::from_model(model).map(drop),
         "mnemonic" => MnemonicNetwork::from_model(model).map(drop),
         "neural-imm" => BankNetwork::from_model(model).map(drop),
         "tr-mtt" => TransformerNetwork::from_model(model).map(drop),

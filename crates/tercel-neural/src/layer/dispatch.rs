@@ -14,6 +14,12 @@ pub(crate) trait Arithmetic: Copy {
     /// `x w + sum`, number by number, rounded as [`fused`](Arithmetic::fused) does.
     fn gather(self, x: Self::Vector, weights: &[f32; LANES], sum: Self::Vector) -> Self::Vector;
 
+    /// Eight numbers as a vector.
+    fn load(self, numbers: &[f32; LANES]) -> Self::Vector;
+
+    /// `a b`, number by number.
+    fn times(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+
     /// The numbers of a vector.
     fn numbers(self, vector: Self::Vector) -> [f32; LANES];
 
@@ -46,6 +52,16 @@ macro_rules! arrays {
             }
 
             #[inline(always)]
+            fn load(self, numbers: &[f32; LANES]) -> [f32; LANES] {
+                *numbers
+            }
+
+            #[inline(always)]
+            fn times(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+                std::array::from_fn(|i| a[i] * b[i])
+            }
+
+            #[inline(always)]
             fn numbers(self, vector: [f32; LANES]) -> [f32; LANES] {
                 vector
             }
@@ -75,6 +91,16 @@ impl Arithmetic for pulp::x86::V3 {
     #[inline(always)]
     fn gather(self, x: pulp::f32x8, weights: &[f32; LANES], sum: pulp::f32x8) -> pulp::f32x8 {
         self.mul_add_f32x8(x, pulp::cast(*weights), sum)
+    }
+
+    #[inline(always)]
+    fn load(self, numbers: &[f32; LANES]) -> pulp::f32x8 {
+        pulp::cast(*numbers)
+    }
+
+    #[inline(always)]
+    fn times(self, a: pulp::f32x8, b: pulp::f32x8) -> pulp::f32x8 {
+        self.mul_f32x8(a, b)
     }
 
     #[inline(always)]

@@ -67,6 +67,16 @@ impl Linear {
         dispatch(Forward { layer: self, input, output, relu: true });
     }
 
+    /// Writes the tangents of the outputs along tangents of the inputs: the product with the matrix alone.
+    ///
+    /// # Panics
+    /// When the slices do not hold the same number of rows.
+    pub fn tangents(&self, input: &[f32], output: &mut [f32]) {
+        self.checked(input, output);
+        output.fill(0.0);
+        dispatch(Product { matrix: &self.weight, input, output });
+    }
+
     fn checked(&self, input: &[f32], output: &[f32]) {
         super::same_batch(&[(input.len(), self.inputs()), (output.len(), self.outputs())]);
     }
@@ -87,5 +97,18 @@ impl Kernel for Forward<'_> {
         if self.relu {
             relu_pass(self.output);
         }
+    }
+}
+
+struct Product<'a> {
+    matrix: &'a Matrix,
+    input: &'a [f32],
+    output: &'a mut [f32],
+}
+
+impl Kernel for Product<'_> {
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, machine: A) {
+        self.matrix.add_product(machine, self.input, self.output);
     }
 }

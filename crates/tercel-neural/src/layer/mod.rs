@@ -5,6 +5,9 @@
 //! | [`Linear`] | nothing |
 //! | [`Gru`] | one row of its size |
 //! | [`Lstm`] | two rows of its size |
+//! | [`Ltc`] | one row of its size |
+//! | [`Cfc`] | one row of its size |
+//! | [`Mlp`] | nothing |
 //! | [`Bidirectional`] | nothing: takes a whole window |
 //! | [`Attention`] | nothing: takes a whole window |
 //! | [`LayerNorm`] | nothing |
@@ -14,6 +17,8 @@
 //! Weights and activations are `f32`. Sizes come with the weights. A batch is `[batch, width]`, row by row; how many rows
 //! there are follows from the lengths of the slices. Memories and scratch space belong to the caller.
 //!
+//! [`Cell`] is any of the layers that a filter may be driven by, with derivatives ([`Tangents`]).
+//!
 //! ## Arithmetic
 //! On x86-64 machines with AVX2 and FMA the layers use them, chosen when the program runs; on Arm they use NEON; elsewhere
 //! they are plain. A row gives the same bits alone and in any batch, and on all machines with fused arithmetic. Plain
@@ -22,25 +27,39 @@
 pub mod activation;
 mod attention;
 mod bidirectional;
+mod cell;
+#[cfg(test)]
+mod cell_tests;
+mod cfc;
 mod dispatch;
 mod gru;
 mod layer_norm;
 mod linear;
 mod lstm;
+mod ltc;
 mod matrix;
+mod mlp;
 mod running_norm;
 mod shape;
+mod synapses;
+mod tangents;
 #[cfg(test)]
 mod tests;
 
 pub use attention::{Attention, positions};
 pub use bidirectional::Bidirectional;
+pub use cell::{Cell, CellShape};
+pub use cfc::Cfc;
 pub use gru::Gru;
 pub use layer_norm::LayerNorm;
 pub use linear::Linear;
 pub use lstm::Lstm;
+pub use ltc::{Ltc, LtcWeights, Solver};
+pub use mlp::Mlp;
 pub use running_norm::RunningNorm;
 pub use shape::LayerShape;
+pub use synapses::SynapseWeights;
+pub use tangents::Tangents;
 
 /// The number of rows in slices of these lengths and widths, which must agree.
 fn same_batch(sizes: &[(usize, usize)]) -> usize {

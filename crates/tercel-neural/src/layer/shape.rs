@@ -1,6 +1,9 @@
 //! Which tensors a layer is made of.
 
-use super::{Attention, Bidirectional, Gru, LayerNorm, Linear, Lstm};
+use super::{
+    Attention, Bidirectional, Cell, CellShape, Cfc, Gru, LayerNorm, Linear, Lstm, Ltc, LtcWeights, Mlp,
+    SynapseWeights,
+};
 use crate::error::ModelError;
 use crate::model::Weights;
 
@@ -37,6 +40,31 @@ pub enum LayerShape {
         /// Width of the output.
         size: usize,
     },
+    /// An [`Ltc`] layer.
+    Ltc {
+        /// Width of an input row.
+        inputs: usize,
+        /// Number of neurons.
+        size: usize,
+    },
+    /// A [`Cfc`] layer.
+    Cfc {
+        /// Width of an input row.
+        inputs: usize,
+        /// Number of neurons.
+        size: usize,
+        /// Width of the backbone.
+        backbone: usize,
+    },
+    /// An [`Mlp`].
+    Mlp {
+        /// Width of an input row.
+        inputs: usize,
+        /// Width of the first layer.
+        hidden: usize,
+        /// Width of an output row.
+        size: usize,
+    },
     /// A [`Bidirectional`] layer.
     Bidirectional {
         /// Width of an input row.
@@ -56,6 +84,12 @@ pub enum LayerShape {
     },
 }
 
+/// Numbers of the synapses of an LTC, from its input and among its neurons.
+const SYNAPSES: [[&str; 4]; 2] = [
+    ["input.strength", "input.slope", "input.centre", "input.reversal"],
+    ["hidden.strength", "hidden.slope", "hidden.centre", "hidden.reversal"],
+];
+
 impl LayerShape {
     /// Names and shapes of the tensors of a layer of this name.
     pub fn tensors(self, name: &str) -> Vec<(String, Vec<usize>)> {
@@ -72,6 +106,29 @@ impl LayerShape {
             LayerShape::Attention { size } => {
                 let part = LayerShape::Linear { inputs: size, outputs: size };
                 return within(&[("query", part), ("key", part), ("value", part), ("output", part)]);
+            }
+            LayerShape::Mlp { inputs, hidden, size } => {
+                let first = LayerShape::Linear { inputs, outputs: hidden };
+                return within(&[
+                    ("first", first),
+                    ("second", LayerShape::Linear { inputs: hidden, outputs: size }),
+                ]);
+            }
+            LayerShape::Ltc { inputs, size } => {
+                let neurons = ["leak", "rest", "capacitance"].map(|part| (part, vec![size]));
+                let of_input = SYNAPSES[0].map(|part| (part, vec![inputs, size]));
+                let of_hidden = SYNAPSES[1].map(|part| (part, vec![size, size]));
+                neurons.into_iter().chain(of_input).chain(of_hidden).collect()
+            }
+            LayerShape::Cfc { inputs, size, backbone } => {
+                let heads = times(4, size);
+                vec![
+                    ("input", vec![inputs, backbone]),
+                    ("hidden", vec![size, backbone]),
+                    ("bias", vec![backbone]),
+                    ("heads", vec![backbone, heads]),
+                    ("heads_bias", vec![heads]),
+                ]
             }
             LayerShape::LayerNorm { size } => vec![("weight", vec![size]), ("bias", vec![size])],
             LayerShape::Linear { inputs, outputs } => {
@@ -126,6 +183,38 @@ impl Weights<'_> {
         let parts = self.layer(name, LayerShape::Lstm { inputs, size })?;
         Ok(Lstm::new(inputs, size, parts[0], parts[1], parts[2]))
     }
+
+    /// Takes a cell with this many inputs.
+    ///
+    /// # Errors
+    /// When one of its tensors is missing or has another shape.
+    pub fn cell(&mut self, name: &str, inputs: usize, shape: CellShape) -> Result<Cell, ModelError> {
+        match shape {
+            CellShape::Gru { size } => self.gru(name, inputs, size).map(Cell::Gru),
+            CellShape::Mlp { size, hidden } => {
+                let first = self.linear(&format!("{name}.first"), inputs, hidden)?;
+                let second = self.linear(&format!("{name}.second"), hidden, size)?;
+                Ok(Cell::Mlp(Mlp::new(first, second)))
+            }
+            CellShape::Cfc { size, backbone } => {
+                let p = self.layer(name, shape.layer(inputs))?;
+                Ok(Cell::Cfc(Cfc::new(inputs, size, backbone, p[0], p[1], p[2], p[3], p[4])))
+            }
+            CellShape::Ltc { size, unfolds, solver } => {
+                let p = self.layer(name, shape.layer(inputs))?;
+                let synapses = |at: usize| SynapseWeights {
+                    strength: p[at],
+                    slope: p[at + 1],
+                    centre: p[at + 2],
+                    reversal: p[at + 3],
+                };
+                let (input, hidden) = (synapses(3), synapses(7));
+                let weights = LtcWeights { leak: p[0], rest: p[1], capacitance: p[2], input, hidden };
+                Ok(Cell::Ltc(Ltc::new(inputs, size, solver, unfolds, weights)))
+            }
+        }
+    }
+
     /// Takes a bidirectional layer.
     ///
     /// # Errors

@@ -12,9 +12,11 @@ use tercel_core::motion::{Motion, Turn};
 use tercel_core::sensor::{ConvertedPolar, Measurement};
 use tercel_neural::filter::{
     Architecture, Attention, BankNetwork, BranchHyper, Covariance, DeepMttHyper, EnsKNetsHyper,
-    EnsembleNetwork, Feature, GainNetwork, KalmanNetHyper, MnemonicHyper, MnemonicNetwork, NeuralImmHyper,
-    Normalisation, ResidualNetwork, Sign, TrMttHyper, TransformerNetwork,
+    EnsembleNetwork, Feature, Form, GainNetwork, KalmanNetHyper, LiquidHyper, LiquidNetwork, MnemonicHyper,
+    MnemonicNetwork, NeuralImmHyper, Normalisation, Residual, ResidualNetwork, Sign, TrMttHyper,
+    TransformerNetwork,
 };
+use tercel_neural::layer::{CellShape, Solver};
 use tercel_neural::{Card, Model, Tensor};
 
 /// The state of all filters here.
@@ -179,4 +181,35 @@ pub fn small_tr_mtt() -> TrMttHyper {
     let sizes =
         TrMttHyper { window: 6, size: 8, heads: 2, encoder: 1, decoder: 1, feed: 9, ..TrMttHyper::default() };
     TrMttHyper { acceleration: 1.0, speed: 20.0, ..sizes }
+}
+
+/// A liquid network with random weights.
+pub fn liquid(hyper: &LiquidHyper, size: f32) -> Arc<LiquidNetwork> {
+    let model = model("liquid", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(LiquidNetwork::from_model(&model).unwrap())
+}
+
+/// One cell of each kind, for the objects of the conformance suite.
+pub const CELLS: [CellShape; 6] = [
+    CellShape::Ltc { size: 9, unfolds: 6, solver: Solver::Fused },
+    CellShape::Ltc { size: 6, unfolds: 24, solver: Solver::Euler },
+    CellShape::Ltc { size: 5, unfolds: 12, solver: Solver::RungeKutta },
+    CellShape::Cfc { size: 7, backbone: 10 },
+    CellShape::Gru { size: 8 },
+    CellShape::Mlp { size: 6, hidden: 9 },
+];
+
+pub fn small_liquid(cell: CellShape) -> LiquidHyper {
+    let form = Residual { acceleration: 1.0, noise: 0.7, ..Residual::default() };
+    LiquidHyper { cell, speed: 20.0, form: Form::Residual(form), ..LiquidHyper::default() }
+}
+
+/// As published, for objects within two kilometres.
+pub fn paper_liquid() -> LiquidHyper {
+    let limits = [2000.0, 2000.0, 60.0, 60.0];
+    LiquidHyper {
+        cell: CELLS[0],
+        speed: 20.0,
+        ..LiquidHyper::paper(limits.map(|limit| -limit), limits, 1e-2, [10.0, 10.0, 5.0, 5.0])
+    }
 }

@@ -12,21 +12,30 @@
 
 mod attention;
 mod bidirectional;
+mod cell;
+#[cfg(test)]
+mod cell_tests;
+mod cfc;
 mod dropout;
 mod gru;
 mod layer_norm;
 mod linear;
 mod lstm;
+mod ltc;
+mod synapses;
 #[cfg(test)]
 mod tests;
 
 pub use attention::{Attention, Mask};
 pub use bidirectional::Bidirectional;
+pub use cell::Cell;
+pub use cfc::Cfc;
 pub use dropout::dropout;
 pub use gru::Gru;
 pub use layer_norm::LayerNorm;
 pub use linear::{Activation, Linear};
 pub use lstm::{Lstm, LstmState};
+pub use ltc::Ltc;
 
 use crate::TrainError;
 

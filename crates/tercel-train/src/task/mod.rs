@@ -3,7 +3,9 @@
 pub mod deep_mtt;
 pub mod ens_knets;
 pub mod flights;
+mod gaussians;
 pub mod kalman_net;
+pub mod liquid;
 pub mod mnemonic;
 pub mod neural_imm;
 pub mod plots;
@@ -20,10 +22,11 @@ use crate::recipe;
 use crate::trainer::{Progress, Run, Summary};
 
 /// The kinds of recipes.
-pub const KINDS: [&str; 6] = [
+pub const KINDS: [&str; 7] = [
     <deep_mtt::DeepMttKind as recipe::Kind>::NAME,
     <ens_knets::EnsKNetsKind as recipe::Kind>::NAME,
     <kalman_net::KalmanNetKind as recipe::Kind>::NAME,
+    <liquid::LiquidKind as recipe::Kind>::NAME,
     <mnemonic::MnemonicKind as recipe::Kind>::NAME,
     <neural_imm::NeuralImmKind as recipe::Kind>::NAME,
     <tr_mtt::TrMttKind as recipe::Kind>::NAME,
@@ -43,6 +46,7 @@ pub fn train(
         "deep-mtt" => deep_mtt::train(recipe, run, observer),
         "ens-knets" => ens_knets::train(recipe, run, observer),
         "kalman-net" => kalman_net::train(recipe, run, observer),
+        "liquid" => liquid::train(recipe, run, observer),
         "mnemonic" => mnemonic::train(recipe, run, observer),
         "neural-imm" => neural_imm::train(recipe, run, observer),
         "tr-mtt" => tr_mtt::train(recipe, run, observer),

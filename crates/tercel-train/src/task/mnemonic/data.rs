@@ -7,8 +7,8 @@ use tercel_core::filter::{Extended, Filter};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Sensor};
 
-use super::operations::{GAUSSIAN, Reading, push};
 use crate::TrainError;
+use crate::task::gaussians::{GAUSSIAN, Reading, push};
 use crate::task::plots::Plots;
 use crate::trainer::Draw;
 

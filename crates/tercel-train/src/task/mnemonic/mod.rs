@@ -38,8 +38,9 @@ use tercel_neural::filter::MnemonicHyper;
 use tercel_neural::{Card, Model, Scale};
 
 pub use data::Flown;
-use operations::{GAUSSIAN, Step, Surprise, gaussian};
+use operations::Step;
 
+use super::gaussians::{GAUSSIAN, Surprise, gaussian};
 use super::plots::{Plots, PlotsConfig};
 use crate::backend::{Tensor, apply, constant, detached, values};
 use crate::check::{at_least, positive, refused};

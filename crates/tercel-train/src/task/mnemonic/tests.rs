@@ -113,7 +113,7 @@ fn the_gradients_of_a_step_and_of_the_surprise_are_their_slopes() {
                     if i == j { 15.0 } else { 4.0 * ((i * 4 + j + member) as f64).sin() }
                 },
             );
-        operations::push(&mut states, &mean, &(root * root.transpose()));
+        crate::task::gaussians::push(&mut states, &mean, &(root * root.transpose()));
     }
     let mut reading = (*flown.readings[step]).clone();
     reading.noises = [400.0, 30.0, 30.0, 200.0].repeat(3);
