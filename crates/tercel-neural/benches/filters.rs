@@ -92,6 +92,7 @@ fn neural_imm(bencher: Bencher) {
     let network = BankNetwork::from_model(&shipped::model("neural-imm").unwrap()).unwrap();
     let radar = RangeBearing::new(50.0, 0.009).unwrap();
     time(bencher, &NeuralImm::new(Arc::new(network), &[radar]).unwrap());
+}
 
 /// The prediction of 500 components of a mixture, with their covariances, by a cell of 32 units.
 #[divan::bench(args = ["ltc", "ltc with differences", "cfc", "gru", "mlp"])]

@@ -38,13 +38,13 @@ pub const PUBLISHED: [PublishedFigures; 15] = [
         Some((33.25, 30.72)),
     ),
     row(
-        "classification-paper",
+        "ens-knets-classification-paper",
         "atc-validation",
         [(240.57, 126.27), (330.25, 179.19), (74.71, 29.69)],
         Some((72.93, 18.43)),
     ),
     row(
-        "correction-paper",
+        "ens-knets-correction-paper",
         "atc-validation",
         [(228.65, 105.35), (317.10, 149.11), (59.61, 20.54)],
         Some((33.25, 30.72)),

@@ -63,7 +63,13 @@ pub const METHODS: [&str; 19] = [
 ];
 
 /// Names of the methods of the ablation: what the branches of the published ensemble are worth.
-pub const ABLATION: [&str; 2] = ["average-paper", "att-ens-kalmannets-paper"];
+pub const ABLATION: [&str; 5] = [
+    "average-paper",
+    "ens-knets-classification-paper",
+    "ens-knets-correction-paper",
+    "ens-knets-paper",
+    "att-ens-kalmannets-paper",
+];
 
 /// The method of that name, for a population (one of [`NAMES`](tercel_sim::air_traffic::NAMES), of which only `bayes` makes use).
 ///
@@ -83,7 +89,10 @@ pub fn method(name: &str, population: &AirTraffic) -> Result<Box<dyn Method>, St
         "kalman-net" => learned::kalman_net()?,
         "kalman-net-paper" => learned::kalman_net_paper()?,
         "att-ens-kalmannets" => learned::ensemble("att-ens-kalmannets")?,
-        "att-ens-kalmannets-paper" => Box::new(learned::PublishedEnsemble::new(name)?),
+        "ens-knets-classification-paper"
+        | "ens-knets-correction-paper"
+        | "ens-knets-paper"
+        | "att-ens-kalmannets-paper" => Box::new(learned::PublishedEnsemble::new(name)?),
         "mnemonic" => learned::mnemonic()?,
         "deep-mtt" => learned::deep_mtt()?,
         "tr-mtt" => learned::tr_mtt()?,
