@@ -14,7 +14,7 @@ use crate::output::{print, print_json};
 #[derive(Debug, Subcommand)]
 #[command(after_long_help = AFTER)]
 pub enum ModelsCommand {
-    /// List models with their kind, name, number of parameters and validation loss.
+    /// List models with their kind, number of parameters, day of training and validation loss.
     #[command(after_long_help = LIST_AFTER)]
     List(JsonArguments),
     /// Print the cards of models, and what their tensors are.
