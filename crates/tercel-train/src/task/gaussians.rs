@@ -8,7 +8,10 @@ use std::sync::Arc;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use tercel_core::belief::Gaussian;
 
-use crate::backend::{Forward, Matrix, Operation, Past};
+use crate::TrainError;
+use crate::backend::{Forward, Matrix, Operation, Past, Tensor, apply, constant, detached, values};
+use crate::check::{at_least, positive};
+use crate::trainer::Loss;
 
 /// Numbers of a Gaussian.
 pub const GAUSSIAN: usize = 20;
@@ -26,6 +29,96 @@ pub fn gaussian(row: &[f32]) -> Gaussian<4> {
 pub fn push(rows: &mut Vec<f32>, mean: &Vector4<f64>, covariance: &Matrix4<f64>) {
     rows.extend(mean.iter().map(|value| *value as f32));
     rows.extend((0..4).flat_map(|i| (0..4).map(move |j| covariance[(i, j)] as f32)));
+}
+
+/// Gaussians of a batch before and after its last measurement: rows `[members, 40]`.
+#[derive(Debug, Clone)]
+pub struct Both(pub Tensor);
+
+impl Both {
+    /// Of new objects, `[members, 20]`: the birth is both.
+    pub fn born(births: Tensor) -> Self {
+        Self(Tensor::cat(vec![births.clone(), births], 1))
+    }
+
+    /// Before the last measurement.
+    pub fn prior(&self) -> Tensor {
+        self.0.clone().narrow(1, 0, GAUSSIAN)
+    }
+
+    /// After it.
+    pub fn posterior(&self) -> Tensor {
+        self.0.clone().narrow(1, GAUSSIAN, GAUSSIAN)
+    }
+
+    /// The same, through which no gradient flows back.
+    pub fn detached(self) -> Self {
+        Self(detached(self.0))
+    }
+
+    /// What the last measurement changed of the mean, and what is known after it, of each member.
+    pub fn corrected(&self) -> Vec<(Vector4<f64>, Gaussian<4>)> {
+        let of = |row: &[f32]| {
+            let [prior, posterior] = [gaussian(&row[..GAUSSIAN]), gaussian(&row[GAUSSIAN..])];
+            (posterior.mean - prior.mean, posterior)
+        };
+        values(&self.0).chunks_exact(2 * GAUSSIAN).map(of).collect()
+    }
+}
+
+/// What predictions and estimates cost.
+#[derive(Debug, Clone, Copy)]
+pub struct Costs {
+    /// Weight of the surprise by the truth, of predictions.
+    pub surprise: f64,
+    /// Weight of the squared errors of estimates.
+    pub error: f64,
+    /// What errors of the position (m) and the velocity (m/s) are divided by.
+    pub scales: [f64; 2],
+}
+
+impl Costs {
+    /// Refuses weights and scales of `[loss]` that make no sense.
+    pub fn check(&self) -> Result<(), TrainError> {
+        at_least("loss.surprise", self.surprise, 0.0)?;
+        at_least("loss.error", self.error, 0.0)?;
+        positive("loss.position", self.scales[0])?;
+        positive("loss.velocity", self.scales[1])?;
+        Ok(())
+    }
+
+    /// The loss of some steps with their true states, `[steps * members, 4]`.
+    pub fn loss<'a>(&self, steps: impl Iterator<Item = &'a Both> + Clone, truth: &[f32]) -> Loss {
+        let priors = Tensor::cat(steps.clone().map(Both::prior).collect(), 0);
+        let posteriors = Tensor::cat(steps.map(Both::posterior).collect(), 0);
+        let [rows, _] = priors.dims();
+        let truth = truth[..4 * rows].to_vec();
+        let surprise = apply(Surprise { truth: Arc::new(truth.clone()) }, [priors]);
+        let errors = posteriors.narrow(1, 0, 4) - constant(truth, [rows, 4]);
+        let [position, velocity] = mean_squares(&errors);
+        let [p, v] = self.scales.map(|scale| (1.0 / scale) as f32);
+        let scaled = errors * constant(vec![p, p, v, v], [1, 4]);
+        let squares = (scaled.clone() * scaled).mean().reshape([1, 1]);
+        let parts = vec![
+            ("surprise", f64::from(values(&surprise)[0])),
+            ("position", position),
+            ("velocity", velocity),
+        ];
+        let value = surprise * self.surprise as f32 + squares * self.error as f32;
+        Loss { value, terms: rows as f64, parts }
+    }
+}
+
+/// Mean squares of rows of errors, of position and velocity.
+pub fn mean_squares(errors: &Tensor) -> [f64; 2] {
+    let [rows, _] = errors.dims();
+    let mut sums = [0.0; 2];
+    for row in values(errors).as_chunks::<4>().0 {
+        let square = |a: f32, b: f32| (f64::from(a).powi(2) + f64::from(b).powi(2)) / (2 * rows) as f64;
+        sums[0] += square(row[0], row[1]);
+        sums[1] += square(row[2], row[3]);
+    }
+    sums
 }
 
 /// What a batch is given at one step.

@@ -37,15 +37,16 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix4, Vector4};
 use serde::Deserialize;
+use tercel_core::belief::Gaussian;
 use tercel_neural::filter::{Absolute, Form, LiquidHyper, LiquidNetwork, Seen, Span};
 use tercel_neural::{Card, Model, Scale};
 
 pub use data::{LiquidData, Watched};
 use operations::Step;
 
-use super::gaussians::{GAUSSIAN, Surprise, gaussian};
+use super::gaussians::{Both, Costs, GAUSSIAN, mean_squares};
 use crate::backend::{Tensor, apply, constant, detached, values};
-use crate::check::{at_least, positive, refused};
+use crate::check::refused;
 use crate::layer::{Activation, Cell, Linear};
 use crate::recipe::{Kind, Recipe};
 use crate::trainer::{self, Draw, Loss, Progress, Run, Split, Summary, Task};
@@ -78,6 +79,12 @@ pub struct LiquidLoss {
     pub window: usize,
 }
 
+impl LiquidLoss {
+    fn costs(&self) -> Costs {
+        Costs { surprise: self.surprise, error: self.error, scales: [self.position, self.velocity] }
+    }
+}
+
 impl Default for LiquidLoss {
     fn default() -> Self {
         Self { surprise: 1.0, error: 0.1, position: 5.0, velocity: 3.0, window: 25 }
@@ -99,26 +106,15 @@ pub struct LiquidTask {
 /// A batch of filters between two steps.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// Gaussians before and after the last measurement, `[members, 40]`.
-    both: Tensor,
+    both: Both,
     /// Whether there was one.
     measured: Vec<f32>,
     memory: Tensor,
 }
 
 impl State {
-    /// Before the last measurement.
-    fn prior(&self) -> Tensor {
-        self.both.clone().narrow(1, 0, GAUSSIAN)
-    }
-
-    /// After it.
-    fn posterior(&self) -> Tensor {
-        self.both.clone().narrow(1, GAUSSIAN, GAUSSIAN)
-    }
-
     fn detached(self) -> Self {
-        Self { both: detached(self.both), memory: detached(self.memory), measured: self.measured }
+        Self { both: self.both.detached(), memory: detached(self.memory), measured: self.measured }
     }
 }
 
@@ -131,10 +127,7 @@ impl LiquidTask {
     pub fn new(recipe: &Recipe<LiquidKind>) -> Result<(Self, ParameterSet), TrainError> {
         let (hyper, loss, data) = (recipe.model.clone(), recipe.loss.clone(), recipe.data.clone());
         hyper.check().map_err(|reason| TrainError::Recipe(format!("[model]: {reason}")))?;
-        at_least("loss.surprise", loss.surprise, 0.0)?;
-        at_least("loss.error", loss.error, 0.0)?;
-        positive("loss.position", loss.position)?;
-        positive("loss.velocity", loss.velocity)?;
+        loss.costs().check()?;
         data.check()?;
         if hyper.interval != data.interval {
             let expected = format!("the trajectories have a step of {} s", data.interval);
@@ -188,7 +181,7 @@ impl LiquidTask {
     fn first(&self, watched: &Watched) -> State {
         let births = constant(watched.births.clone(), [watched.members, GAUSSIAN]);
         State {
-            both: Tensor::cat(vec![births.clone(), births], 1),
+            both: Both::born(births),
             measured: vec![1.0; watched.members],
             memory: Cell::zero(watched.members, self.hyper.cell),
         }
@@ -196,13 +189,13 @@ impl LiquidTask {
 
     /// What is known of each member.
     fn seen(&self, state: &State) -> Vec<Seen> {
-        let both = values(&state.both);
-        let of = |(row, measured): (&[f32], &f32)| {
-            let [prior, posterior] = [gaussian(&row[..GAUSSIAN]), gaussian(&row[GAUSSIAN..])];
-            let measured = *measured != 0.0;
-            Seen { mean: posterior.mean, correction: posterior.mean - prior.mean, measured }
+        let members = state.both.corrected().into_iter().zip(&state.measured);
+        let of = |((correction, posterior), measured): ((_, Gaussian<4>), &f32)| Seen {
+            mean: posterior.mean,
+            correction,
+            measured: *measured != 0.0,
         };
-        both.chunks_exact(2 * GAUSSIAN).zip(&state.measured).map(of).collect()
+        members.map(of).collect()
     }
 
     /// What the network says of each member, the memory after it, and the Jacobians of the predictions.
@@ -262,28 +255,13 @@ impl LiquidTask {
         let reading = Arc::clone(&watched.readings[step]);
         let measured = reading.seen.clone();
         let operation = Step { form, span: self.span(), jacobians: Arc::new(jacobians), reading };
-        State { both: apply(operation, [state.posterior(), outputs]), measured, memory }
+        State { both: Both(apply(operation, [state.both.posterior(), outputs])), measured, memory }
     }
 
     /// The loss of some steps, from `first` on.
     fn judge(&self, watched: &Watched, states: &[State], first: usize) -> Loss {
-        let priors = Tensor::cat(states.iter().map(State::prior).collect(), 0);
-        let posteriors = Tensor::cat(states.iter().map(State::posterior).collect(), 0);
-        let [rows, _] = priors.dims();
-        let truth = watched.truth[4 * first * watched.members..][..4 * rows].to_vec();
-        let surprise = apply(Surprise { truth: Arc::new(truth.clone()) }, [priors]);
-        let errors = posteriors.narrow(1, 0, 4) - constant(truth, [rows, 4]);
-        let [position, velocity] = mean_squares(&errors);
-        let [p, v] = [self.loss.position, self.loss.velocity].map(|scale| (1.0 / scale) as f32);
-        let scaled = errors * constant(vec![p, p, v, v], [1, 4]);
-        let squares = (scaled.clone() * scaled).mean().reshape([1, 1]);
-        let parts = vec![
-            ("surprise", f64::from(values(&surprise)[0])),
-            ("position", position),
-            ("velocity", velocity),
-        ];
-        let value = surprise * self.loss.surprise as f32 + squares * self.loss.error as f32;
-        Loss { value, terms: rows as f64, parts }
+        let truth = &watched.truth[4 * first * watched.members..];
+        self.loss.costs().loss(states.iter().map(|state| &state.both), truth)
     }
 
     /// The loss of the publication: errors of the next states of some steps.
@@ -316,18 +294,6 @@ impl LiquidTask {
         let value = (errors.clone() * errors).mean().reshape([1, 1]);
         Loss { value, terms: rows as f64, parts: vec![("position", position), ("velocity", velocity)] }
     }
-}
-
-/// Mean squares of rows of errors, of position and velocity.
-fn mean_squares(errors: &Tensor) -> [f64; 2] {
-    let [rows, _] = errors.dims();
-    let mut sums = [0.0; 2];
-    for row in values(errors).as_chunks::<4>().0 {
-        let square = |a: f32, b: f32| (f64::from(a).powi(2) + f64::from(b).powi(2)) / (2 * rows) as f64;
-        sums[0] += square(row[0], row[1]);
-        sums[1] += square(row[2], row[3]);
-    }
-    sums
 }
 
 impl Task for LiquidTask {

@@ -4,6 +4,7 @@ use tercel_neural::filter::{Derivative, LiquidKalman};
 use tercel_neural::layer::{CellShape, Solver};
 
 use super::*;
+use crate::task::gaussians::{Surprise, gaussian};
 use crate::task::{gaussians, repository};
 
 const RECIPE: &str = "
@@ -147,7 +148,7 @@ fn agree(task: &LiquidTask, set: &ParameterSet) {
     let (mut state, trained_network) = (task.first(&watched), task.network(&weights));
     for step in 1..=200 {
         state = task.step(&weights, trained_network.as_ref(), &watched, state, step);
-        let found = values(&state.posterior());
+        let found = values(&state.both.posterior());
         for (member, (belief, filter)) in beliefs.iter_mut().zip(&filters).enumerate() {
             filter.predict(belief, 1.0);
             place(member, step).map(|place| filter.update(belief, &place).unwrap());

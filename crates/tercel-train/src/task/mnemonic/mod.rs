@@ -40,10 +40,10 @@ use tercel_neural::{Card, Model, Scale};
 pub use data::Flown;
 use operations::Step;
 
-use super::gaussians::{GAUSSIAN, Surprise, gaussian};
+use super::gaussians::{Both, Costs, GAUSSIAN};
 use super::plots::{Plots, PlotsConfig};
-use crate::backend::{Tensor, apply, constant, detached, values};
-use crate::check::{at_least, positive, refused};
+use crate::backend::{Tensor, apply, constant};
+use crate::check::refused;
 use crate::layer::{Activation, Linear, Lstm, LstmState, numbered};
 use crate::recipe::{Kind, Recipe};
 use crate::trainer::{self, Draw, Loss, Progress, Run, Split, Summary, Task};
@@ -76,6 +76,12 @@ pub struct MnemonicLoss {
     pub window: usize,
 }
 
+impl MnemonicLoss {
+    fn costs(&self) -> Costs {
+        Costs { surprise: self.surprise, error: self.error, scales: [self.position, self.velocity] }
+    }
+}
+
 impl Default for MnemonicLoss {
     fn default() -> Self {
         Self { surprise: 1.0, error: 0.1, position: 250.0, velocity: 50.0, window: 40 }
@@ -96,27 +102,16 @@ pub struct MnemonicTask {
 /// A batch of filters between two steps.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// Gaussians before and after the last measurement, `[members, 40]`.
-    both: Tensor,
+    both: Both,
     /// Whether there was one.
     seen: Vec<f32>,
     memory: Vec<LstmState>,
 }
 
 impl State {
-    /// Before the last measurement.
-    fn prior(&self) -> Tensor {
-        self.both.clone().narrow(1, 0, GAUSSIAN)
-    }
-
-    /// After it.
-    fn posterior(&self) -> Tensor {
-        self.both.clone().narrow(1, GAUSSIAN, GAUSSIAN)
-    }
-
     fn detached(self) -> Self {
         let memory = self.memory.into_iter().map(LstmState::detached).collect();
-        Self { both: detached(self.both), seen: self.seen, memory }
+        Self { both: self.both.detached(), seen: self.seen, memory }
     }
 }
 
@@ -129,10 +124,7 @@ impl MnemonicTask {
     pub fn new(recipe: &Recipe<MnemonicKind>) -> Result<(Self, ParameterSet), TrainError> {
         let (hyper, loss) = (recipe.model.clone(), recipe.loss.clone());
         hyper.check().map_err(|reason| TrainError::Recipe(format!("[model]: {reason}")))?;
-        at_least("loss.surprise", loss.surprise, 0.0)?;
-        at_least("loss.error", loss.error, 0.0)?;
-        positive("loss.position", loss.position)?;
-        positive("loss.velocity", loss.velocity)?;
+        loss.costs().check()?;
         let plots = Plots::new(&recipe.data, recipe.seed, 2)?;
         if hyper.interval != plots.interval() {
             let expected = format!("the flights have a step of {} s", plots.interval());
@@ -160,7 +152,7 @@ impl MnemonicTask {
     fn first(&self, flown: &Flown) -> State {
         let births = constant(flown.births.clone(), [flown.members, GAUSSIAN]);
         State {
-            both: Tensor::cat(vec![births.clone(), births], 1),
+            both: Both::born(births),
             seen: vec![1.0; flown.members],
             memory: self.recurrent.iter().map(|layer| LstmState::zero(flown.members, layer.size())).collect(),
         }
@@ -170,12 +162,9 @@ impl MnemonicTask {
     fn see(&self, flown: &Flown, state: &State) -> Tensor {
         let width = self.hyper.inputs();
         let mut inputs = vec![0.0; flown.members * width];
-        let both = values(&state.both);
-        let rows = both.chunks_exact(2 * GAUSSIAN).zip(inputs.chunks_exact_mut(width));
-        for (member, (row, inputs)) in rows.enumerate() {
-            let [prior, posterior] = [gaussian(&row[..GAUSSIAN]), gaussian(&row[GAUSSIAN..])];
+        let members = state.both.corrected().into_iter().zip(inputs.chunks_exact_mut(width));
+        for (member, ((correction, posterior), inputs)) in members.enumerate() {
             let origin = Vector2::new(flown.origins[2 * member], flown.origins[2 * member + 1]);
-            let correction = posterior.mean - prior.mean;
             let seen = state.seen[member] != 0.0;
             self.hyper.see(&posterior, origin + posterior.mean.xy(), (&correction, seen), inputs);
         }
@@ -198,34 +187,14 @@ impl MnemonicTask {
             origins: Arc::clone(&flown.origins),
             reading: Arc::clone(reading),
         };
-        let both = apply(operation, [state.posterior(), self.output.forward(weights, x)]);
+        let both = Both(apply(operation, [state.both.posterior(), self.output.forward(weights, x)]));
         State { both, seen: reading.seen.clone(), memory }
     }
 
     /// The loss of some steps, from `first` on.
     fn judge(&self, flown: &Flown, states: &[State], first: usize) -> Loss {
-        let priors = Tensor::cat(states.iter().map(State::prior).collect(), 0);
-        let posteriors = Tensor::cat(states.iter().map(State::posterior).collect(), 0);
-        let [rows, _] = priors.dims();
-        let truth = flown.truth[4 * first * flown.members..][..4 * rows].to_vec();
-        let surprise = apply(Surprise { truth: Arc::new(truth.clone()) }, [priors]);
-        let errors = posteriors.narrow(1, 0, 4) - constant(truth, [rows, 4]);
-        let [mut position, mut velocity] = [0.0, 0.0];
-        for row in values(&errors).as_chunks::<4>().0 {
-            let square = |a: f32, b: f32| f64::from(a).powi(2) + f64::from(b).powi(2);
-            position += square(row[0], row[1]) / (2 * rows) as f64;
-            velocity += square(row[2], row[3]) / (2 * rows) as f64;
-        }
-        let [p, v] = [self.loss.position, self.loss.velocity].map(|scale| (1.0 / scale) as f32);
-        let scaled = errors * constant(vec![p, p, v, v], [1, 4]);
-        let squares = (scaled.clone() * scaled).mean().reshape([1, 1]);
-        let parts = vec![
-            ("surprise", f64::from(values(&surprise)[0])),
-            ("position", position),
-            ("velocity", velocity),
-        ];
-        let value = surprise * self.loss.surprise as f32 + squares * self.loss.error as f32;
-        Loss { value, terms: rows as f64, parts }
+        let truth = &flown.truth[4 * first * flown.members..];
+        self.loss.costs().loss(states.iter().map(|state| &state.both), truth)
     }
 }
 

@@ -2,6 +2,8 @@ use tercel_core::filter::Filter;
 use tercel_neural::filter::{MnemonicKalman, MnemonicNetwork};
 
 use super::*;
+use crate::backend::values;
+use crate::task::gaussians::{Surprise, gaussian};
 use crate::task::repository;
 
 const RECIPE: &str = "
@@ -73,7 +75,7 @@ fn agree(task: &MnemonicTask, set: &ParameterSet) {
     let mut state = task.first(&flown);
     for step in 1..=200 {
         state = task.step(&weights, &flown, state, step);
-        let found = values(&state.posterior());
+        let found = values(&state.both.posterior());
         for (member, (belief, sighting)) in beliefs.iter_mut().zip(&sightings).enumerate() {
             filter.predict(belief, 1.0);
             if let Some(plot) = &sighting.plots[step] {
