@@ -2,7 +2,7 @@
 
 use super::hyper::Aligned;
 use super::regression::Regression;
-use super::track::{Length, Track};
+use super::track::Track;
 use super::view::View;
 
 /// What is known of an object before it is predicted, apart from the recursion.
@@ -20,7 +20,7 @@ pub struct Before<'a> {
 
 /// Numbers that the memory sees, with this many past velocities.
 pub(super) fn motion_seen(order: usize) -> usize {
-    14 + if order > 0 { 5 + 2 * order } else { 0 }
+    13 + if order > 0 { 5 + 2 * order } else { 0 }
 }
 
 /// Numbers that are seen of a scan besides its points.
@@ -80,7 +80,7 @@ impl Aligned {
     ///
     /// # Panics
     /// When the row has another length than that of the first layer.
-    pub fn see_motion(&self, track: &Track<f64>, before: &Before<'_>, length: Length, numbers: &mut [f32]) {
+    pub fn see_motion(&self, track: &Track<f64>, before: &Before<'_>, numbers: &mut [f32]) {
         let axis = heading(self, track.velocity, before.angle);
         let mut row = Row { numbers, next: 0 };
         let [x, y, vx, vy] = before.correction;
@@ -93,7 +93,6 @@ impl Aligned {
         self.see_size(track, &mut row);
         let (sine, cosine) = (2.0 * (before.angle - axis[1].atan2(axis[0]))).sin_cos();
         row.both([cosine - 1.0, sine]);
-        row.put(length.share.abs().max(1e-6).ln());
         if self.identification.order > 0 {
             let expected = before.regression.expected();
             row.bent(turned(axis, [0, 1].map(|i| expected[i] - track.velocity[i])), self.change);

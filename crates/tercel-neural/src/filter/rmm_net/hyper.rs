@@ -20,7 +20,15 @@ pub struct RmmNetHyper {
     /// Units of the memory.
     pub memory: usize,
     /// What the network sees and says.
-    pub form: Aligned,
+    pub form: Form,
+}
+
+/// What the network sees and says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Form {
+    /// In the frame of the object, with the points themselves.
+    Aligned(Aligned),
 }
 
 /// The network works in the frame of the object, and sees the points themselves.
@@ -85,7 +93,7 @@ impl Default for Aligned {
 impl RmmNetHyper {
     /// The layers of the network, by name.
     pub fn layers(&self) -> Vec<(String, LayerShape)> {
-        let Aligned { hidden, encoder, .. } = self.form;
+        let Aligned { hidden, encoder, .. } = *self.aligned();
         let linear = |name: &str, inputs, outputs| (name.to_owned(), LayerShape::Linear { inputs, outputs });
         let sizes = self.sizes();
         vec![
@@ -101,9 +109,15 @@ impl RmmNetHyper {
         ]
     }
 
+    /// The options of the form.
+    pub fn aligned(&self) -> &Aligned {
+        let Form::Aligned(form) = &self.form;
+        form
+    }
+
     /// Widths of what is seen and said.
     pub fn sizes(&self) -> Sizes {
-        let order = self.form.identification.order;
+        let order = self.aligned().identification.order;
         Sizes {
             motion_seen: motion_seen(order),
             motion_said: MOTION + order,
@@ -133,7 +147,7 @@ impl RmmNetHyper {
     /// # Errors
     /// Names the option, what it is and what was expected.
     pub fn check(&self) -> Result<(), String> {
-        let form = &self.form;
+        let form = self.aligned();
         checked_sizes(&[
             ("memory", self.memory),
             ("form.hidden", form.hidden),

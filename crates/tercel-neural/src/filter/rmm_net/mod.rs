@@ -25,7 +25,7 @@ use belief::gaussian;
 
 pub use belief::RmmNetBelief;
 pub use features::{Before, heading};
-pub use hyper::{Aligned, RmmNetHyper, Sizes};
+pub use hyper::{Aligned, Form, RmmNetHyper, Sizes};
 pub use network::RmmNetwork;
 pub use number::{Number, Symmetric};
 pub use regression::{Identification, Regression};
@@ -79,7 +79,7 @@ impl RmmNet {
     }
 
     fn options(&self) -> &Aligned {
-        &self.network.hyper().form
+        self.network.hyper().aligned()
     }
 
     /// The filter that compares scans with what is expected. Its motion is not used.
@@ -145,7 +145,7 @@ impl Filter<4> for RmmNet {
         let (next, scratch) = belief.memory.stage();
         let mut room = Room(scratch);
         let (seen, said) = (room.take(sizes.motion_seen), room.take(sizes.motion_said));
-        options.see_motion(&before, &known, length, seen);
+        options.see_motion(&before, &known, seen);
         self.network.say_motion(seen, next, room.0, said);
         let sound = finite(said) && finite(next);
         let mut wide = [0.0; 80];

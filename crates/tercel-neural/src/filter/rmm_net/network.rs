@@ -52,7 +52,7 @@ impl RmmNetwork {
     pub fn from_model(model: &Model) -> Result<Self, ModelError> {
         model.expect(KIND, &LABELS)?;
         let hyper = RmmNetHyper::of(model)?;
-        let (memory, hidden, encoder) = (hyper.memory, hyper.form.hidden, hyper.form.encoder);
+        let (memory, hidden, encoder) = (hyper.memory, hyper.aligned().hidden, hyper.aligned().encoder);
         let sizes = hyper.sizes();
         let seen = sizes.motion_seen;
         let mut weights = model.weights();
@@ -87,7 +87,7 @@ impl RmmNetwork {
 
     /// Numbers of scratch space that a step of one object needs, without its points.
     pub(super) fn scratch(&self) -> usize {
-        let (sizes, size, form) = (self.hyper.sizes(), self.hyper.memory, &self.hyper.form);
+        let (sizes, size, form) = (self.hyper.sizes(), self.hyper.memory, self.hyper.aligned());
         let own = sizes.motion_seen + sizes.motion_said;
         let motion = own + size + sizes.motion_seen + form.hidden + self.memory.scratch(1);
         let own = sizes.scan_seen + form.hidden + sizes.scan_said + sizes.extent_seen + sizes.extent_said;
@@ -99,7 +99,7 @@ impl RmmNetwork {
     pub(super) fn say_motion(&self, seen: &[f32], memory: &mut [f32], scratch: &mut [f32], said: &mut [f32]) {
         let mut room = Room(scratch);
         let joined = room.take(self.hyper.memory + seen.len());
-        let hidden = room.take(self.hyper.form.hidden);
+        let hidden = room.take(self.hyper.aligned().hidden);
         let (output, cell) = memory.split_at_mut(self.hyper.memory);
         self.memory.step(seen, output, cell, room.0);
         joined[..output.len()].copy_from_slice(output);
@@ -116,7 +116,7 @@ impl RmmNetwork {
         scratch: &mut [f32],
         (hidden, said): (&mut [f32], &mut [f32]),
     ) {
-        let width = self.hyper.form.encoder;
+        let width = self.hyper.aligned().encoder;
         let point = self.hyper.sizes().point;
         let mut room = Room(scratch);
         let joined = room.take(2 * width + seen.len() + self.hyper.memory);
@@ -134,14 +134,14 @@ impl RmmNetwork {
 
     /// Numbers of room for the points of a scan and what the encoder makes of them.
     pub(super) fn room(&self, count: usize) -> usize {
-        count * (self.hyper.sizes().point + 2 * self.hyper.form.encoder)
+        count * (self.hyper.sizes().point + 2 * self.hyper.aligned().encoder)
     }
 
     /// What the layer before the last word about a scan, and what is seen of the extent, say about it.
     pub(super) fn say_extent(&self, scan: &[f32], seen: &[f32], scratch: &mut [f32], said: &mut [f32]) {
         let mut room = Room(scratch);
         let joined = room.take(scan.len() + seen.len());
-        let hidden = room.take(self.hyper.form.hidden);
+        let hidden = room.take(self.hyper.aligned().hidden);
         joined[..scan.len()].copy_from_slice(scan);
         joined[scan.len()..].copy_from_slice(seen);
         self.extent.say(joined, hidden, said);

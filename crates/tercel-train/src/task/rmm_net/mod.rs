@@ -146,7 +146,7 @@ impl RmmNetTask {
         };
         let window = if costs.window == 0 { data.steps } else { costs.window };
         let mut set = ParameterSet::new(recipe.seed);
-        let Aligned { hidden, encoder, .. } = hyper.form;
+        let Aligned { hidden, encoder, .. } = *hyper.aligned();
         let sizes = hyper.sizes();
         let task = Self {
             memory: Lstm::new(&mut set, "memory", sizes.motion_seen, hyper.memory)?,
@@ -161,7 +161,7 @@ impl RmmNetTask {
                 [2 * encoder + sizes.scan_seen + hyper.memory, hidden, sizes.scan_said],
             )?,
             extent: Head::new(&mut set, "extent", [hidden + sizes.extent_seen, hidden, sizes.extent_said])?,
-            options: Arc::new(hyper.form.clone()),
+            options: Arc::new(hyper.aligned().clone()),
             scattering: data.scattering()?,
             costs: Costs { window, ..costs },
             hyper,
@@ -199,7 +199,7 @@ impl RmmNetTask {
         let mut seen = vec![0.0; members * sizes.motion_seen];
         for ((track, known), row) in before.iter().zip(&mut known).zip(seen.chunks_exact_mut(sizes.motion_seen)) {
             known.regression.take(&options.identification, options.change, track.velocity, known.measured);
-            options.see_motion(track, &known.before(), self.length(), row);
+            options.see_motion(track, &known.before(), row);
         }
         let seen = constant(seen, [members, sizes.motion_seen]);
         let memory = self.memory.step(weights, seen.clone(), memory);

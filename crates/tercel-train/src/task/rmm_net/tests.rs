@@ -30,6 +30,7 @@ mixed = 0.5
 interval = 1.0
 memory = 7
 [model.form]
+kind = "aligned"
 hidden = 6
 encoder = 5
 identification = { order = 4 }
