@@ -6,6 +6,7 @@ use tercel_core::error::FilterError;
 use tercel_core::extended::{InverseWishart, eigen};
 
 use super::features::Before;
+use super::kinematics::Kinematics;
 use super::number::Symmetric;
 use super::regression::Regression;
 use super::track::{Report, Track};
@@ -21,6 +22,8 @@ pub struct RmmNetBelief {
     /// Direction of the first axis, rad, and the logarithm of the weight of the extent.
     pub(super) angle: f64,
     pub(super) ln_weight: f64,
+    /// The direction before the last prediction, which an object that stands keeps, rad.
+    pub(super) held: f64,
     /// What the measurements of the present step changed, and whether there was one.
     pub(super) correction: [f64; 4],
     pub(super) measured: bool,
@@ -39,9 +42,9 @@ impl PartialEq for Room {
     }
 }
 
-/// The Gaussian of a track.
-pub(super) fn gaussian(track: &Track<f64>) -> Gaussian<4> {
-    let Track { place, velocity, place_covariance: pp, cross: c, velocity_covariance: vv, .. } = track;
+/// The Gaussian as a vector and a matrix.
+pub(super) fn gaussian(motion: &Kinematics<f64>) -> Gaussian<4> {
+    let Kinematics { place, velocity, place_covariance: pp, cross: c, velocity_covariance: vv } = motion;
     Gaussian {
         mean: Vector4::new(place[0], place[1], velocity[0], velocity[1]),
         covariance: nalgebra::Matrix4::new(
@@ -50,6 +53,23 @@ pub(super) fn gaussian(track: &Track<f64>) -> Gaussian<4> {
             c[0][0], c[1][0], vv.xx, vv.xy, //
             c[0][1], c[1][1], vv.xy, vv.yy,
         ),
+    }
+}
+
+/// The blocks of a Gaussian.
+pub(super) fn kinematics(state: &Gaussian<4>) -> Kinematics<f64> {
+    let (mean, p) = (&state.mean, &state.covariance);
+    let block = |i: usize| Symmetric {
+        xx: p[(i, i)],
+        xy: 0.5 * (p[(i, i + 1)] + p[(i + 1, i)]),
+        yy: p[(i + 1, i + 1)],
+    };
+    Kinematics {
+        place: [mean.x, mean.y],
+        velocity: [mean.z, mean.w],
+        place_covariance: block(0),
+        cross: [[p[(0, 2)], p[(0, 3)]], [p[(1, 2)], p[(1, 3)]]],
+        velocity_covariance: block(2),
     }
 }
 
@@ -71,21 +91,7 @@ impl RmmNetBelief {
 
     /// The recursion's part of it.
     pub(super) fn track(&self) -> Track<f64> {
-        let (mean, p) = (&self.state.mean, &self.state.covariance);
-        let block = |i: usize| Symmetric {
-            xx: p[(i, i)],
-            xy: 0.5 * (p[(i, i + 1)] + p[(i + 1, i)]),
-            yy: p[(i + 1, i + 1)],
-        };
-        Track {
-            place: [mean.x, mean.y],
-            velocity: [mean.z, mean.w],
-            place_covariance: block(0),
-            cross: [[p[(0, 2)], p[(0, 3)]], [p[(1, 2)], p[(1, 3)]]],
-            velocity_covariance: block(2),
-            axes: self.axes,
-            worth: self.worth,
-        }
+        Track { motion: kinematics(&self.state), axes: self.axes, worth: self.worth }
     }
 
     pub(super) fn before(&self) -> Before<'_> {
@@ -117,8 +123,11 @@ impl RmmNetBelief {
             return;
         }
         let swapped = (angle - self.angle).cos().abs() < std::f64::consts::FRAC_1_SQRT_2;
-        let (first, second, turn) =
-            if swapped { (values.y, values.x, std::f64::consts::FRAC_PI_2) } else { (values.x, values.y, 0.0) };
+        let (first, second, turn) = if swapped {
+            (values.y, values.x, std::f64::consts::FRAC_PI_2)
+        } else {
+            (values.x, values.y, 0.0)
+        };
         self.axes = [0.5 * first.ln(), 0.5 * second.ln()];
         self.angle = angle + turn;
         self.ln_weight = extent.weight().ln();
@@ -136,10 +145,10 @@ impl RmmNetBelief {
         mix(&mut self.ln_weight, other.ln_weight);
         let double = |angle: f64| (2.0 * angle).sin_cos();
         let ((sine, cosine), (other_sine, other_cosine)) = (double(self.angle), double(other.angle));
-        let (sine, cosine) =
-            (sine + share * (other_sine - sine), cosine + share * (other_cosine - cosine));
+        let (sine, cosine) = (sine + share * (other_sine - sine), cosine + share * (other_cosine - cosine));
         if share > 0.0 && sine.hypot(cosine) > 1e-12 {
             self.angle = 0.5 * sine.atan2(cosine);
+            self.held = self.angle;
         }
         for (ours, theirs) in self.correction.iter_mut().zip(other.correction) {
             mix(ours, theirs);

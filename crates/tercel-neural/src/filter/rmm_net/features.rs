@@ -81,21 +81,21 @@ impl Aligned {
     /// # Panics
     /// When the row has another length than that of the first layer.
     pub fn see_motion(&self, track: &Track<f64>, before: &Before<'_>, numbers: &mut [f32]) {
-        let axis = heading(self, track.velocity, before.angle);
+        let axis = heading(self, track.motion.velocity, before.angle);
         let mut row = Row { numbers, next: 0 };
         let [x, y, vx, vy] = before.correction;
-        row.put((speed(track.velocity) / self.velocity).asinh());
+        row.put((speed(track.motion.velocity) / self.velocity).asinh());
         row.bent(turned(axis, [vx, vy]), self.change);
         row.bent(turned(axis, [x, y]), self.change);
         row.put(f64::from(u8::from(before.measured)));
-        let own = track.velocity_covariance.turned([axis[0], -axis[1]]);
+        let own = track.motion.velocity_covariance.turned([axis[0], -axis[1]]);
         row.both([own.xx, own.yy].map(|variance| ln_deviation(variance, self.change)));
         self.see_size(track, &mut row);
         let (sine, cosine) = (2.0 * (before.angle - axis[1].atan2(axis[0]))).sin_cos();
         row.both([cosine - 1.0, sine]);
         if self.identification.order > 0 {
             let expected = before.regression.expected();
-            row.bent(turned(axis, [0, 1].map(|i| expected[i] - track.velocity[i])), self.change);
+            row.bent(turned(axis, [0, 1].map(|i| expected[i] - track.motion.velocity[i])), self.change);
             row.bent(turned(axis, before.regression.missed()), self.change);
             row.put(ln_deviation(before.regression.deviation().powi(2), self.change));
             for velocity in &before.regression.past()[1..] {
@@ -118,8 +118,9 @@ impl Aligned {
         let mut row = Row { numbers, next: 0 };
         let axis = view.axis;
         let back = [axis[0], -axis[1]];
-        let (place, velocity) = (prior.place_covariance.turned(back), prior.velocity_covariance.turned(back));
-        let offset = view.within([0, 1].map(|i| view.mean[i] - prior.place[i]));
+        let (place, velocity) =
+            (prior.motion.place_covariance.turned(back), prior.motion.velocity_covariance.turned(back));
+        let offset = view.within([0, 1].map(|i| view.mean[i] - prior.motion.place[i]));
         let variances = [place.xx, place.yy];
         let square = |i: usize| view.deviations[i] * view.deviations[i];
         row.both([0, 1].map(|i| (offset[i] / (variances[i] + square(i)).sqrt()).asinh()));
@@ -135,8 +136,8 @@ impl Aligned {
         for vector in [view.course, view.concentration] {
             self.see_direction(vector, axis, &mut row);
         }
-        row.put((speed(prior.velocity) / self.velocity).asinh());
-        let along = turned(axis, prior.velocity);
+        row.put((speed(prior.motion.velocity) / self.velocity).asinh());
+        let along = turned(axis, prior.motion.velocity);
         row.bent(along, self.velocity);
         row.both([0, 1].map(|i| 0.5 * (variances[i] / square(i)).max(1e-12).ln()));
         row.both([velocity.xx, velocity.yy].map(|variance| ln_deviation(variance, self.change)));
@@ -159,12 +160,16 @@ impl Aligned {
     /// When the row is shorter than that.
     pub fn see_extent(&self, after: &Track<f64>, view: &View, numbers: &mut [f32]) {
         let mut row = Row { numbers, next: 0 };
-        let v = after.velocity;
+        let v = after.motion.velocity;
         row.put((speed(v) / self.velocity).asinh());
         let square = v[0] * v[0] + v[1] * v[1];
-        let across = after.velocity_covariance.form([-v[1], v[0]], [-v[1], v[0]]);
+        let across = after.motion.velocity_covariance.form([-v[1], v[0]], [-v[1], v[0]]);
         let weight = (0.25 * square / across.max(1e-12 * square).max(f64::MIN_POSITIVE)).min(1e8);
-        self.see_direction([weight * (v[0] * v[0] - v[1] * v[1]), weight * 2.0 * v[0] * v[1]], view.axis, &mut row);
+        self.see_direction(
+            [weight * (v[0] * v[0] - v[1] * v[1]), weight * 2.0 * v[0] * v[1]],
+            view.axis,
+            &mut row,
+        );
         self.see_direction(view.concentration, view.axis, &mut row);
         self.see_size(after, &mut row);
         debug_assert_eq!(row.next, EXTENT_SEEN);

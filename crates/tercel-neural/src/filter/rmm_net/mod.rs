@@ -3,6 +3,7 @@
 mod belief;
 mod features;
 mod hyper;
+mod kinematics;
 mod network;
 mod number;
 mod regression;
@@ -26,6 +27,7 @@ use belief::gaussian;
 pub use belief::RmmNetBelief;
 pub use features::{Before, heading};
 pub use hyper::{Aligned, Form, RmmNetHyper, Sizes};
+pub use kinematics::Kinematics;
 pub use network::RmmNetwork;
 pub use number::{Number, Symmetric};
 pub use regression::{Identification, Regression};
@@ -67,6 +69,9 @@ pub struct RmmNet {
 /// Points for which a new belief has room.
 const ROOM: usize = 64;
 
+/// Speed beyond which objects go straight, in units of a new object's.
+const FASTEST: f64 = 1e3;
+
 impl RmmNet {
     /// A filter of this network, for a sensor whose points spread so.
     pub fn new(network: Arc<RmmNetwork>, scattering: Scattering) -> Self {
@@ -92,8 +97,7 @@ impl RmmNet {
     }
 
     fn compared(&self, belief: &RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
-        let expected =
-            GaussianInverseWishart { state: belief.state, extent: belief.extent()?, rate: None };
+        let expected = GaussianInverseWishart { state: belief.state, extent: belief.extent()?, rate: None };
         self.classical()?.innovation(&expected, points)
     }
 }
@@ -120,11 +124,12 @@ impl Filter<4> for RmmNet {
         let (track, angle) = options.birth(points, &self.scattering);
         let memory = vec![0.0; self.network.memory()];
         Ok(RmmNetBelief {
-            state: gaussian(&track),
+            state: gaussian(&track.motion),
             axes: track.axes,
             worth: track.worth,
             angle,
             ln_weight: options.worth.ln(),
+            held: angle,
             correction: [0.0; 4],
             measured: true,
             regression: Regression::new(&options.identification),
@@ -140,14 +145,21 @@ impl Filter<4> for RmmNet {
         let (options, sizes) = (self.options(), self.network.hyper().sizes());
         let length = Length { dt, share: dt / self.network.hyper().interval };
         let before = belief.track();
-        belief.regression.take(&options.identification, options.change, before.velocity, belief.measured);
+        belief.regression.take(
+            &options.identification,
+            options.change,
+            before.motion.velocity,
+            belief.measured,
+        );
         let known = Before { regression: &belief.regression, ..belief.before() };
         let (next, scratch) = belief.memory.stage();
         let mut room = Room(scratch);
         let (seen, said) = (room.take(sizes.motion_seen), room.take(sizes.motion_said));
         options.see_motion(&before, &known, seen);
         self.network.say_motion(seen, next, room.0, said);
-        let sound = finite(said) && finite(next);
+        let [vx, vy] = before.motion.velocity;
+        // Weights of past velocities may let a speed grow for as long as nothing is measured.
+        let sound = finite(said) && finite(next) && vx.hypot(vy) < FASTEST * options.speed;
         let mut wide = [0.0; 80];
         if sound {
             widened(said, &mut wide);
@@ -157,15 +169,16 @@ impl Filter<4> for RmmNet {
             belief.memory.commit();
         }
         let past = Past {
-            heading: heading(options, before.velocity, belief.angle),
+            heading: heading(options, before.motion.velocity, belief.angle),
             velocities: belief.regression.past(),
             expected: belief.regression.expected(),
         };
         let prior = before.predict(options, &past, wide, length);
         let report = prior.foresee(options, belief.angle, wide);
-        belief.state = gaussian(&prior);
+        belief.state = gaussian(&prior.motion);
         // What cannot be saved is reported by the next update.
         let _ = belief.state.settle();
+        belief.held = belief.angle;
         belief.report(&prior, &report);
         (belief.correction, belief.measured) = ([0.0; 4], false);
     }
@@ -178,7 +191,7 @@ impl Filter<4> for RmmNet {
         let (options, sizes, count) = (self.options(), self.network.hyper().sizes(), points.count());
         let prior = belief.track();
         let noise = self.scattering.noise();
-        let view = View::new(options, &prior, belief.angle, points, (self.scattering.scale(), &noise));
+        let view = View::new(options, &prior, belief.held, points, (self.scattering.scale(), &noise));
         let needed = self.network.room(count);
         if belief.room.0.len() < needed {
             belief.room.0.resize(needed, 0.0);
@@ -196,15 +209,15 @@ impl Filter<4> for RmmNet {
         if finite(said) && finite(hidden) {
             widened(said, &mut wide);
         }
-        let mut after = prior.update(&view, &wide[..sizes.scan_said]);
+        let mut after = prior.update(options, &view, &wide[..sizes.scan_said]);
         options.see_extent(&after, &view, seen_extent);
         self.network.say_extent(hidden, seen_extent, room.0, said_extent);
         wide = [0.0; 80];
         if finite(said_extent) {
             widened(said_extent, &mut wide);
         }
-        let report = after.settle_extent(&view, &wide[..sizes.extent_said]);
-        let mut state = gaussian(&after);
+        let report = after.settle_extent(options, &view, &wide[..sizes.extent_said]);
+        let mut state = gaussian(&after.motion);
         state.settle()?;
         let sound = after.axes.iter().chain([&after.worth, &report.angle]).all(|value| value.is_finite());
         if !sound {

@@ -68,7 +68,11 @@ impl RmmNetwork {
                 "scan",
                 [2 * encoder + sizes.scan_seen + memory, hidden, sizes.scan_said],
             )?,
-            extent: Head::take(&mut weights, "extent", [hidden + sizes.extent_seen, hidden, sizes.extent_said])?,
+            extent: Head::take(
+                &mut weights,
+                "extent",
+                [hidden + sizes.extent_seen, hidden, sizes.extent_said],
+            )?,
             hyper: hyper.clone(),
         };
         weights.finish()?;

@@ -81,6 +81,16 @@ pub(super) fn within<T: Number>(x: T, limit: f64) -> T {
     (x * (1.0 / limit)).tanh() * limit
 }
 
+/// `x`, or the nearest of the limits as a constant.
+#[inline]
+pub(super) fn clamped<T: Number>(x: T, low: f64, high: f64) -> T {
+    match x.value() {
+        value if value < low => T::of(low),
+        value if value > high => T::of(high),
+        _ => x,
+    }
+}
+
 /// A symmetric matrix in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Symmetric<T> {

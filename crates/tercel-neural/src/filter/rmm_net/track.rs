@@ -3,22 +3,15 @@
 use tercel_core::extended::{Points, Scattering};
 
 use super::hyper::Aligned;
-use super::number::{Number, Symmetric, within};
+use super::kinematics::Kinematics;
+use super::number::{Number, Symmetric, clamped, within};
 use super::view::View;
 
-/// What the recursion carries from step to step: the Gaussian of the state in blocks, and the size of the object.
+/// What the recursion carries from step to step: the state, and the size of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Track<T> {
-    /// Mean of the position, m.
-    pub place: [T; 2],
-    /// Mean of the velocity, m/s.
-    pub velocity: [T; 2],
-    /// Covariance of the position, m².
-    pub place_covariance: Symmetric<T>,
-    /// Covariance of position and velocity, `[position][velocity]`, m²/s.
-    pub cross: [[T; 2]; 2],
-    /// Covariance of the velocity, m²/s².
-    pub velocity_covariance: Symmetric<T>,
+    /// The state.
+    pub motion: Kinematics<T>,
     /// Logarithms of the semi-axes in metres, along and across.
     pub axes: [T; 2],
     /// How many points the axes are worth.
@@ -78,6 +71,15 @@ const WEIGHT: f64 = 30.0;
 /// The same of an extent that is predicted.
 const FORESEEN: f64 = 5.0;
 
+/// Largest factor between semi-axes and those of a new object.
+const STRETCH: f64 = 50.0;
+
+/// Least and greatest worth of the axes, in points.
+const WORTH: [f64; 2] = [0.01, 1e6];
+
+/// Deviation of the velocity beyond which it is not made to grow, in units of a new object's.
+const LOST: f64 = 100.0;
+
 fn logistic<T: Number>(x: T) -> T {
     T::of(1.0) / ((-x).exp() + 1.0)
 }
@@ -95,20 +97,24 @@ impl<T: Number> Track<T> {
         let slid = back(past.heading, [said[2], said[3]]);
         let gate = said[4];
         let mut change = [turned[0] * options.change, turned[1] * options.change];
-        let now = self.velocity.map(T::value);
+        let before = &self.motion;
+        let now = before.velocity.map(T::value);
         for i in 0..2 {
             change[i] = change[i] + gate * (past.expected[i] - now[i]);
             for (weight, pair) in said[MOTION..].iter().zip(past.velocities.windows(2)) {
                 change[i] = change[i] + *weight * (pair[0][i] - pair[1][i]);
             }
         }
-        let kept = (within(said[5], 1.5) * share) + 1.0;
-        let velocity: [T; 2] = std::array::from_fn(|i| self.velocity[i] + change[i] * share);
+        let lost = before.velocity_covariance.xx.value() + before.velocity_covariance.yy.value()
+            > (LOST * options.speed).powi(2);
+        // Without measurements for long, the covariance must not grow by a factor in each step.
+        let kept = if lost { T::of(1.0) } else { (within(said[5], 1.5) * share) + 1.0 };
+        let velocity: [T; 2] = std::array::from_fn(|i| before.velocity[i] + change[i] * share);
         let place = std::array::from_fn(|i| {
-            self.place[i] + velocity[i] * dt + slid[i] * (options.change * share * dt)
+            before.place[i] + velocity[i] * dt + slid[i] * (options.change * share * dt)
         });
         let noise = self.noise(options, past.heading, said, share);
-        let (pp, pv, vv) = (&self.place_covariance, &self.cross, &self.velocity_covariance);
+        let (pp, pv, vv) = (&before.place_covariance, &before.cross, &before.velocity_covariance);
         let step = kept * dt;
         let slip = options.change * dt * SLIP;
         let [along, across] = [said[9], said[10]].map(|l| (within(l, LOGARITHM) * 2.0).exp());
@@ -136,14 +142,15 @@ impl<T: Number> Track<T> {
             })
         });
         let velocity_covariance = vv.scaled(kept * kept).plus(&noise);
-        let axes = std::array::from_fn(|i| self.axes[i] + within(said[11 + i], 1.0) * (0.1 * share));
-        let worth = self.worth * logistic(said[13] + LASTING);
-        Track { place, velocity, place_covariance, cross, velocity_covariance, axes, worth }
+        let axes = options.bounded([0, 1].map(|i| self.axes[i] + within(said[11 + i], 1.0) * (0.1 * share)));
+        let worth = clamped(self.worth * logistic(said[13] + LASTING), WORTH[0], WORTH[1]);
+        let motion = Kinematics { place, velocity, place_covariance, cross, velocity_covariance };
+        Track { motion, axes, worth }
     }
 
     /// The extent that is expected after a prediction: along the course, or in the direction `held` of an object that stands.
     pub fn foresee(&self, options: &Aligned, held: f64, said: &[T]) -> Report<T> {
-        let [x, y] = self.velocity;
+        let [x, y] = self.motion.velocity;
         let moves = x.value().hypot(y.value()) >= options.standing;
         let angle = if moves { y.atan2(x) } else { T::of(held) };
         let ln_weight = within(said[15], LOGARITHM) + FORESEEN.ln();
@@ -159,7 +166,7 @@ impl<T: Number> Track<T> {
 
     /// The update with a scan of at least one point. Outputs of zero are the centroid with its covariance, the direction of the
     /// scatter, and the rule of Feldmann for the axes.
-    pub fn update(&self, view: &View, said: &[T]) -> Track<T> {
+    pub fn update(&self, options: &Aligned, view: &View, said: &[T]) -> Track<T> {
         let mut after = *self;
         let deviations = view.deviations;
         let shift = [0, 1].map(|i| within(said[i], 3.0) * deviations[i]);
@@ -171,69 +178,23 @@ impl<T: Number> Track<T> {
             factors[1] * deviations[1],
         )
         .turned(view.axis.map(T::of));
-        let residual = std::array::from_fn(|i| shift[i] - self.place[i] + view.mean[i]);
-        after.see_place(residual, &noise);
+        let residual = std::array::from_fn(|i| shift[i] - self.motion.place[i] + view.mean[i]);
+        after.motion.see_place(residual, &noise);
         after.see_direction(view, [said[5], said[6]]);
         after.see_size(view, said[7]);
+        after.axes = options.bounded(after.axes);
         after
-    }
-
-    fn see_place(&mut self, residual: [T; 2], noise: &Symmetric<T>) {
-        let (pp, pv, vv) = (self.place_covariance, self.cross, self.velocity_covariance);
-        let inverse = pp.plus(noise).inverse();
-        let weighed = inverse.times(residual);
-        let moved = pp.times(weighed);
-        let columns = [[pv[0][0], pv[1][0]], [pv[0][1], pv[1][1]]];
-        let along = |column: [T; 2], v: [T; 2]| column[0] * v[0] + column[1] * v[1];
-        for i in 0..2 {
-            self.place[i] = self.place[i] + moved[i];
-            self.velocity[i] = self.velocity[i] + along(columns[i], weighed);
-        }
-        // P - P S⁻¹ P = (P⁻¹ + R⁻¹)⁻¹ = R - R S⁻¹ R, which stays positive however small R is.
-        let own = |i: usize| if i == 0 { [noise.xx, noise.xy] } else { [noise.xy, noise.yy] };
-        self.place_covariance = Symmetric {
-            xx: noise.xx - inverse.form(own(0), own(0)),
-            xy: noise.xy - inverse.form(own(0), own(1)),
-            yy: noise.yy - inverse.form(own(1), own(1)),
-        };
-        // P - P S⁻¹ P_pv = R S⁻¹ P_pv.
-        self.cross = std::array::from_fn(|i| std::array::from_fn(|j| inverse.form(own(i), columns[j])));
-        self.velocity_covariance = Symmetric {
-            xx: vv.xx - inverse.form(columns[0], columns[0]),
-            xy: vv.xy - inverse.form(columns[0], columns[1]),
-            yy: vv.yy - inverse.form(columns[1], columns[1]),
-        };
     }
 
     /// The object moves along its first axis: across it the velocity is zero, up to the error of the direction.
     fn see_direction(&mut self, view: &View, said: [T; 2]) {
         let angle = within(said[0], 3.0) * view.lean_deviation.min(0.5) + view.lean;
         let normal = [-angle.sin(), angle.cos()];
-        let v = self.velocity;
-        let deviation = view.lean_deviation;
-        let least = view.least_speed;
+        let v = self.motion.velocity;
+        let (deviation, least) = (view.lean_deviation, view.least_speed);
         let speed = v[0] * v[0] + v[1] * v[1] + least * least;
         let noise = speed * (deviation * deviation) * (within(said[1], 3.0) * 2.0).exp();
-        let cross = &self.cross;
-        let of_place: [T; 2] = std::array::from_fn(|i| cross[i][0] * normal[0] + cross[i][1] * normal[1]);
-        let of_velocity = self.velocity_covariance.times(normal);
-        let square = normal[0] * of_velocity[0] + normal[1] * of_velocity[1] + noise;
-        let scale = T::of(1.0) / square;
-        let missed = -(normal[0] * v[0] + normal[1] * v[1]) * scale;
-        for i in 0..2 {
-            self.place[i] = self.place[i] + of_place[i] * missed;
-            self.velocity[i] = v[i] + of_velocity[i] * missed;
-        }
-        let less = |matrix: &Symmetric<T>, u: [T; 2]| Symmetric {
-            xx: matrix.xx - u[0] * u[0] * scale,
-            xy: matrix.xy - u[0] * u[1] * scale,
-            yy: matrix.yy - u[1] * u[1] * scale,
-        };
-        self.place_covariance = less(&self.place_covariance, of_place);
-        self.velocity_covariance = less(&self.velocity_covariance, of_velocity);
-        self.cross = std::array::from_fn(|i| {
-            std::array::from_fn(|j| self.cross[i][j] - of_place[i] * of_velocity[j] * scale)
-        });
+        self.motion.see_across(normal, noise);
     }
 
     /// The recursion of a random matrix for the axes, in the frame of the object.
@@ -249,14 +210,14 @@ impl<T: Number> Track<T> {
             let ratio = T::of(view.scatter[i] / count) / spread;
             self.axes[i] = self.axes[i] + ((self.worth + gained * ratio) / total).ln() * 0.5;
         }
-        self.worth = total;
+        self.worth = clamped(total, WORTH[0], WORTH[1]);
     }
 
     /// The extent after an update: its direction between the course and the scatter, its axes, and how sure both are.
-    pub fn settle_extent(&mut self, view: &View, said: &[T]) -> Report<T> {
-        let v = self.velocity;
+    pub fn settle_extent(&mut self, options: &Aligned, view: &View, said: &[T]) -> Report<T> {
+        let v = self.motion.velocity;
         let square = v[0] * v[0] + v[1] * v[1] + 1e-6 * view.least_speed * view.least_speed;
-        let across = self.velocity_covariance.form([-v[1], v[0]], [-v[1], v[0]]);
+        let across = self.motion.velocity_covariance.form([-v[1], v[0]], [-v[1], v[0]]);
         // Weight of the course, as the concentration of twice the angle.
         let course = within(said[0], LOGARITHM).exp() * square / (across * 4.0 + 1e-9 * square.value());
         let scan = within(said[1], LOGARITHM).exp();
@@ -265,14 +226,20 @@ impl<T: Number> Track<T> {
             course * (v[0] * v[1] * 2.0) + scan * view.concentration[1],
         ];
         let angle = double[1].atan2(double[0]) * 0.5 + within(said[2], 1.0) * 0.3;
-        for i in 0..2 {
-            self.axes[i] = self.axes[i] + within(said[3 + i], 1.0) * 0.2;
-        }
+        self.axes = options.bounded([0, 1].map(|i| self.axes[i] + within(said[3 + i], 1.0) * 0.2));
         Report { angle, ln_weight: within(said[5], LOGARITHM) + WEIGHT.ln() }
     }
 }
 
 impl Aligned {
+    /// Logarithms of semi-axes that are within reason.
+    fn bounded<T: Number>(&self, axes: [T; 2]) -> [T; 2] {
+        [0, 1].map(|i| {
+            let own = self.axes[i].ln();
+            clamped(axes[i], own - STRETCH.ln(), own + STRETCH.ln())
+        })
+    }
+
     /// The track of a new object at the mean of a scan of at least one point, and the direction of its extent.
     pub fn birth(&self, points: &Points, scattering: &Scattering) -> (Track<f64>, f64) {
         let squares = self.axes.map(|axis| axis * axis);
@@ -286,15 +253,14 @@ impl Aligned {
             yy: (scale * extent.yy + noise.m22) / count,
         };
         let square = self.speed * self.speed;
-        let track = Track {
+        let motion = Kinematics {
             place: [points.mean().x, points.mean().y],
             velocity: [0.0; 2],
             place_covariance,
             cross: [[0.0; 2]; 2],
             velocity_covariance: Symmetric { xx: square, xy: 0.0, yy: square },
-            axes: self.axes.map(f64::ln),
-            worth: self.worth,
         };
+        let track = Track { motion, axes: self.axes.map(f64::ln), worth: self.worth };
         (track, angle)
     }
 }

@@ -150,12 +150,12 @@ fn seen(
 }
 
 fn expected(options: &Aligned, prior: &Track<f64>, held: f64) -> [f64; 2] {
-    let [x, y] = prior.velocity;
+    let [x, y] = prior.motion.velocity;
     let square = x * x + y * y;
     if square < options.standing * options.standing {
         return [(2.0 * held).cos(), (2.0 * held).sin()];
     }
-    let across = prior.velocity_covariance.form([-y, x], [-y, x]);
+    let across = prior.motion.velocity_covariance.form([-y, x], [-y, x]);
     let weight = 0.25 * square / across.max(f64::MIN_POSITIVE);
     bounded([weight * (x * x - y * y), weight * 2.0 * x * y])
 }

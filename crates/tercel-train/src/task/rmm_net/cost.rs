@@ -81,28 +81,18 @@ impl Costs {
         debug_assert_eq!(row.len(), STEP);
         let track = track(row);
         let e: [Variable<'t>; 4] = std::array::from_fn(|i| row[i] + -truth.state[i]);
-        let (pp, vv, c) = (track.place_covariance, track.velocity_covariance, track.cross);
-        let inverse = pp.inverse();
-        // By blocks: the velocity given the position.
-        let columns = [[c[0][0], c[1][0]], [c[0][1], c[1][1]]];
-        let rest = Symmetric {
-            xx: vv.xx - inverse.form(columns[0], columns[0]),
-            xy: vv.xy - inverse.form(columns[0], columns[1]),
-            yy: vv.yy - inverse.form(columns[1], columns[1]),
-        };
+        let (pp, rest) = (track.motion.place_covariance, track.motion.velocity_given_place());
         let place = [e[0], e[1]];
-        let left = [e[2] - inverse.form(columns[0], place), e[3] - inverse.form(columns[1], place)];
-        let square = inverse.form(place, place) + rest.inverse().form(left, left);
+        let shift = track.motion.velocity_shift(place);
+        let left = [e[2] - shift[0], e[3] - shift[1]];
+        let square = pp.inverse().form(place, place) + rest.inverse().form(left, left);
         let surprise = (square + pp.determinant().ln() + rest.determinant().ln()) * 0.5;
         let of_place = (e[0] * e[0] + e[1] * e[1]) * (1.0 / (self.position * self.position));
         let of_velocity = (e[2] * e[2] + e[3] * e[3]) * (1.0 / (self.velocity * self.velocity));
         let found = self.of_extent([row[TRACK], row[TRACK + 1], row[14], row[15]], &truth.extent);
         let expected =
             self.of_extent([row[TRACK + 2], row[TRACK + 3], row[TRACK + 4], row[TRACK + 5]], &truth.extent);
-        surprise * self.surprise
-            + (of_place + of_velocity) * self.error
-            + found
-            + expected * self.foresight
+        surprise * self.surprise + (of_place + of_velocity) * self.error + found + expected * self.foresight
     }
 
     /// Costs of an extent, of its angle, the logarithm of its weight, and those of its axes.
@@ -115,8 +105,7 @@ impl Costs {
         let axes = [along, across].map(|axis| (axis * 2.0).exp());
         let zero = Variable::of(0.0);
         let extent = Symmetric { xx: axes[0], xy: zero, yy: axes[1] }.turned([angle.cos(), angle.sin()]);
-        self.distance(&extent, truth) * (self.shape / size)
-            + score(&extent, ln_weight, truth) * self.score
+        self.distance(&extent, truth) * (self.shape / size) + score(&extent, ln_weight, truth) * self.score
     }
 
     /// The squared Wasserstein distance of the shapes.
@@ -128,7 +117,11 @@ impl Costs {
 }
 
 /// Minus the logarithm of the density of the truth under an inverse Wishart belief, with the mean as given.
-fn score<'t>(mean: &Symmetric<Variable<'t>>, ln_weight: Variable<'t>, truth: &Symmetric<f64>) -> Variable<'t> {
+fn score<'t>(
+    mean: &Symmetric<Variable<'t>>,
+    ln_weight: Variable<'t>,
+    truth: &Symmetric<f64>,
+) -> Variable<'t> {
     let mean = Symmetric { xx: mean.xx.value(), xy: mean.xy.value(), yy: mean.yy.value() };
     let weight = ln_weight.exp();
     let freedom = weight + 6.0;

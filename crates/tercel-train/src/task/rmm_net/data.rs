@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use tercel_core::extended::{Points, Scattering};
-use tercel_neural::filter::rmm_net::{Aligned, Symmetric, Track};
+use tercel_neural::filter::rmm_net::{Aligned, Kinematics, Symmetric, Track};
 use tercel_sim::extended::{Generator, Heading, Ride, Scatterers, Sizes, Vehicle};
 
 use super::cost::Truth;
@@ -269,10 +269,13 @@ impl Rides {
             if !born {
                 let state = ride.states()[0];
                 let own = Symmetric { xx: START, xy: 0.0, yy: START };
-                track.place = [state.x, state.y];
-                track.velocity = [state.z, state.w];
-                (track.place_covariance, track.velocity_covariance) = (own, own);
-                track.cross = [[0.0; 2]; 2];
+                track.motion = Kinematics {
+                    place: [state.x, state.y],
+                    velocity: [state.z, state.w],
+                    place_covariance: own,
+                    cross: [[0.0; 2]; 2],
+                    velocity_covariance: own,
+                };
             }
             rides.births.push((track, angle));
         }

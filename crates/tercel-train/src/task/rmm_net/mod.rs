@@ -26,7 +26,9 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use tercel_core::extended::Scattering;
-use tercel_neural::filter::rmm_net::{Aligned, Before, Length, Past, Regression, RmmNetHyper, Track, View, heading};
+use tercel_neural::filter::rmm_net::{
+    Aligned, Before, Length, Past, Regression, RmmNetHyper, Track, View, heading,
+};
 use tercel_neural::{Card, Model, Scale};
 
 pub use cost::Costs;
@@ -79,11 +81,7 @@ struct Head {
 }
 
 impl Head {
-    fn new(
-        set: &mut ParameterSet,
-        name: &str,
-        [seen, hidden, said]: [usize; 3],
-    ) -> Result<Self, TrainError> {
+    fn new(set: &mut ParameterSet, name: &str, [seen, hidden, said]: [usize; 3]) -> Result<Self, TrainError> {
         let zero = || Initial::Constant(0.0);
         Ok(Head {
             hidden: Linear::new(set, &format!("{name}.hidden"), seen, hidden, Activation::Tanh)?,
@@ -126,7 +124,10 @@ impl RmmNetTask {
     /// # Errors
     ///
     /// If a value makes no sense; before anything is trained.
-    pub fn new(recipe: &Recipe<RmmNetKind>, tracks: Option<Tracks>) -> Result<(Self, ParameterSet), TrainError> {
+    pub fn new(
+        recipe: &Recipe<RmmNetKind>,
+        tracks: Option<Tracks>,
+    ) -> Result<(Self, ParameterSet), TrainError> {
         let (hyper, costs, data) = (recipe.model.clone(), recipe.loss, recipe.data.clone());
         hyper.check().map_err(|reason| TrainError::Recipe(format!("[model]: {reason}")))?;
         costs.check()?;
@@ -150,7 +151,11 @@ impl RmmNetTask {
         let sizes = hyper.sizes();
         let task = Self {
             memory: Lstm::new(&mut set, "memory", sizes.motion_seen, hyper.memory)?,
-            motion: Head::new(&mut set, "motion", [hyper.memory + sizes.motion_seen, hidden, sizes.motion_said])?,
+            motion: Head::new(
+                &mut set,
+                "motion",
+                [hyper.memory + sizes.motion_seen, hidden, sizes.motion_said],
+            )?,
             points: [
                 Linear::new(&mut set, "points.first", sizes.point, encoder, Activation::Relu)?,
                 Linear::new(&mut set, "points.second", encoder, encoder, Activation::Relu)?,
@@ -197,8 +202,15 @@ impl RmmNetTask {
         let State { tracks, memory, mut known } = state;
         let before: Vec<Track<f64>> = values(&tracks).chunks_exact(TRACK).map(plain).collect();
         let mut seen = vec![0.0; members * sizes.motion_seen];
-        for ((track, known), row) in before.iter().zip(&mut known).zip(seen.chunks_exact_mut(sizes.motion_seen)) {
-            known.regression.take(&options.identification, options.change, track.velocity, known.measured);
+        for ((track, known), row) in
+            before.iter().zip(&mut known).zip(seen.chunks_exact_mut(sizes.motion_seen))
+        {
+            known.regression.take(
+                &options.identification,
+                options.change,
+                track.motion.velocity,
+                known.measured,
+            );
             options.see_motion(track, &known.before(), row);
         }
         let seen = constant(seen, [members, sizes.motion_seen]);
@@ -206,8 +218,10 @@ impl RmmNetTask {
         let (_, motion) = self.motion.say(weights, vec![memory.hidden.clone(), seen]);
 
         let said = values(&motion);
-        let said: Vec<Vec<f64>> =
-            said.chunks_exact(sizes.motion_said).map(|row| row.iter().map(|x| f64::from(*x)).collect()).collect();
+        let said: Vec<Vec<f64>> = said
+            .chunks_exact(sizes.motion_said)
+            .map(|row| row.iter().map(|x| f64::from(*x)).collect())
+            .collect();
         let mut given = Vec::with_capacity(members);
         let mut priors = Vec::with_capacity(members);
         let counts: Vec<usize> = rides.scans[step].iter().map(|scan| scan.count()).collect();
@@ -217,16 +231,19 @@ impl RmmNetTask {
         let mut next = 0;
         for member in 0..members {
             let (known, points) = (&known[member], &rides.scans[step][member]);
-            let axis = heading(options, before[member].velocity, known.angle);
+            let axis = heading(options, before[member].motion.velocity, known.angle);
             let velocities = known.regression.past().to_vec();
             let expected = known.regression.expected();
             let past = Past { heading: axis, velocities: &velocities, expected };
             let prior = before[member].predict(options, &past, &said[member], self.length());
             let noise = (self.scattering.scale(), &self.scattering.noise());
-            let view =
-                (!points.is_empty()).then(|| View::new(options, &prior, known.angle, points, noise));
+            let view = (!points.is_empty()).then(|| View::new(options, &prior, known.angle, points, noise));
             if let Some(view) = &view {
-                view.see_points(&prior, points, &mut rows[next * sizes.point..][..points.count() * sizes.point]);
+                view.see_points(
+                    &prior,
+                    points,
+                    &mut rows[next * sizes.point..][..points.count() * sizes.point],
+                );
                 options.see_scan(&prior, view, &mut scans[member * sizes.scan_seen..][..sizes.scan_seen]);
                 next += points.count();
             }
@@ -244,10 +261,16 @@ impl RmmNetTask {
         let mut extents = vec![0.0; members * sizes.extent_seen];
         for member in 0..members {
             if let Some(view) = &given[member].view {
-                let said: Vec<f64> =
-                    said[member * sizes.scan_said..][..sizes.scan_said].iter().map(|x| f64::from(*x)).collect();
-                let after = priors[member].update(view, &said);
-                options.see_extent(&after, view, &mut extents[member * sizes.extent_seen..][..sizes.extent_seen]);
+                let said: Vec<f64> = said[member * sizes.scan_said..][..sizes.scan_said]
+                    .iter()
+                    .map(|x| f64::from(*x))
+                    .collect();
+                let after = priors[member].update(options, view, &said);
+                options.see_extent(
+                    &after,
+                    view,
+                    &mut extents[member * sizes.extent_seen..][..sizes.extent_seen],
+                );
             }
         }
         let extents = constant(extents, [members, sizes.extent_seen]);
@@ -259,7 +282,7 @@ impl RmmNetTask {
             known.iter_mut().zip(&priors).zip(measured).zip(values(&row).chunks_exact(STEP))
         {
             known.angle = f64::from(row[TRACK]);
-            let prior = [prior.place[0], prior.place[1], prior.velocity[0], prior.velocity[1]];
+            let prior = prior.motion.numbers();
             known.correction =
                 std::array::from_fn(|i| if measured { f64::from(row[i]) - prior[i] } else { 0.0 });
             known.measured = measured;
@@ -294,7 +317,7 @@ fn parts(rows: &[f32], truth: &[Truth]) -> Vec<(&'static str, f64)> {
         let product = own.xx * t.xx + 2.0 * own.xy * t.xy + own.yy * t.yy;
         let root = (own.determinant() * t.determinant()).max(0.0).sqrt();
         sums[2] += own.xx + own.yy + t.xx + t.yy - 2.0 * (product + 2.0 * root).max(0.0).sqrt();
-        let inverse = track.place_covariance.inverse();
+        let inverse = track.motion.place_covariance.inverse();
         sums[3] += inverse.form([e[0], e[1]], [e[0], e[1]]);
     }
     let count = truth.len() as f64;
@@ -342,7 +365,11 @@ impl Task for RmmNetTask {
             state = next;
             rows.push(row);
         }
-        *memory = Some(State { tracks: detached(state.tracks), memory: state.memory.detached(), known: state.known });
+        *memory = Some(State {
+            tracks: detached(state.tracks),
+            memory: state.memory.detached(),
+            known: state.known,
+        });
         let truth: Vec<Truth> = rides.truth[first..last].concat();
         let rows = Tensor::cat(rows, 0);
         let parts = parts(&values(&rows), &truth);

@@ -33,15 +33,14 @@ pub struct Step {
 impl Step {
     fn take<T: Number>(&self, member: usize, before: &[T], said: [&[T]; 3]) -> [T; STEP] {
         let given = &self.given[member];
-        let past =
-            Past { heading: given.heading, velocities: &given.velocities, expected: given.expected };
+        let past = Past { heading: given.heading, velocities: &given.velocities, expected: given.expected };
         let prior = track(before).predict(&self.options, &past, said[0], self.length);
         let expected = prior.foresee(&self.options, given.held, said[0]);
         match &given.view {
             None => step(&prior, &expected, &expected, &prior),
             Some(view) => {
-                let mut after = prior.update(view, said[1]);
-                let found = after.settle_extent(view, said[2]);
+                let mut after = prior.update(&self.options, view, said[1]);
+                let found = after.settle_extent(&self.options, view, said[2]);
                 step(&after, &found, &expected, &prior)
             }
         }
@@ -59,8 +58,9 @@ impl Operation<4> for Step {
         let members = inputs[0].rows();
         let mut values = Vec::with_capacity(members * STEP);
         for member in 0..members {
-            let [before, motion, scan, extent] =
-                inputs.each_ref().map(|input| row(input, member).iter().map(|x| f64::from(*x)).collect::<Vec<_>>());
+            let [before, motion, scan, extent] = inputs
+                .each_ref()
+                .map(|input| row(input, member).iter().map(|x| f64::from(*x)).collect::<Vec<_>>());
             let after = self.take(member, &before, [&motion, &scan, &extent]);
             values.extend(after.map(|value| value as f32));
         }

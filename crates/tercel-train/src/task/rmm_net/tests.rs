@@ -2,7 +2,7 @@ use nalgebra::Vector4;
 use tercel_core::belief::Gaussian;
 use tercel_core::extended::Points;
 use tercel_core::filter::Filter;
-use tercel_neural::filter::rmm_net::Symmetric;
+use tercel_neural::filter::rmm_net::{Kinematics, Symmetric};
 use tercel_neural::filter::{RmmNet, RmmNetBelief, RmmNetwork};
 
 use super::*;
@@ -30,7 +30,7 @@ mixed = 0.5
 interval = 1.0
 memory = 7
 [model.form]
-kind = "aligned"
+kind = \"aligned\"
 hidden = 6
 encoder = 5
 identification = { order = 4 }
@@ -116,20 +116,24 @@ fn agree(task: &RmmNetTask, set: &ParameterSet, steps: usize) {
 }
 
 fn gaussian(row: &[f64]) -> Gaussian<4> {
-    let track = rows::track(row);
-    let (pp, c, vv) = (track.place_covariance, track.cross, track.velocity_covariance);
+    let Kinematics { place, velocity, place_covariance: pp, cross: c, velocity_covariance: vv } =
+        Kinematics::of(row);
     Gaussian {
-        mean: Vector4::new(row[0], row[1], row[2], row[3]),
+        mean: Vector4::new(place[0], place[1], velocity[0], velocity[1]),
         covariance: nalgebra::Matrix4::new(
-            pp.xx, pp.xy, c[0][0], c[0][1], pp.xy, pp.yy, c[1][0], c[1][1], c[0][0], c[1][0], vv.xx, vv.xy, c[0][1],
-            c[1][1], vv.xy, vv.yy,
+            pp.xx, pp.xy, c[0][0], c[0][1], //
+            pp.xy, pp.yy, c[1][0], c[1][1], //
+            c[0][0], c[1][0], vv.xx, vv.xy, //
+            c[0][1], c[1][1], vv.xy, vv.yy,
         ),
     }
 }
 
 #[test]
 fn the_gradients_of_a_step_and_its_cost_are_their_slopes() {
-    let (task, _) = task(RECIPE);
+    let (mut task, _) = task(RECIPE);
+    // In the score of the extent its mean counts as given.
+    task.costs.score = 0.0;
     let rides = task.batch(draw(&[1, 2, 5])).unwrap();
     let (options, sizes) = (&task.options, task.hyper.sizes());
     let step = (1..200).find(|step| rides.scans[*step].iter().any(Points::is_empty)).unwrap();
@@ -137,20 +141,22 @@ fn the_gradients_of_a_step_and_its_cost_are_their_slopes() {
     let mut given = Vec::new();
     for member in 0..3 {
         let truth = rides.truth[step][member].state;
-        let root = nalgebra::Matrix4::from_fn(|i, j| {
-            if i == j { 1.5 } else { 0.5 * ((i * 4 + j + member) as f64).sin() }
-        });
+        let root =
+            nalgebra::Matrix4::from_fn(
+                |i, j| {
+                    if i == j { 1.5 } else { 0.5 * ((i * 4 + j + member) as f64).sin() }
+                },
+            );
         let p = root * root.transpose();
         let block = |i: usize| Symmetric { xx: p[(i, i)], xy: p[(i, i + 1)], yy: p[(i + 1, i + 1)] };
-        let track = Track {
+        let motion = Kinematics {
             place: [truth[0] - truth[2] + 0.4, truth[1] - truth[3] - 0.3],
             velocity: [truth[2] + 0.2, truth[3] + 0.3],
             place_covariance: block(0),
             cross: [[p[(0, 2)], p[(0, 3)]], [p[(1, 2)], p[(1, 3)]]],
             velocity_covariance: block(2),
-            axes: [1.6, 0.3],
-            worth: 9.0,
         };
+        let track = Track { motion, axes: [1.6, 0.3], worth: 9.0 };
         let points = &rides.scans[step][member];
         let scattering = (0.25, &task.scattering.noise());
         let view = (!points.is_empty()).then(|| View::new(options, &track, 0.3, points, scattering));
@@ -196,7 +202,8 @@ fn the_gradients_of_a_step_and_its_cost_are_their_slopes() {
 
 #[test]
 fn the_gradients_of_the_whole_loss_are_its_slopes_where_nothing_counts_as_given() {
-    let (task, set) = task(RECIPE);
+    let (mut task, set) = task(RECIPE);
+    task.costs.score = 0.0;
     let rides = task.batch(draw(&[1, 2, 3])).unwrap();
     let loss = |weights: &Weights| {
         let (_, row) = task.step(weights, &rides, task.first(&rides), 1);
@@ -222,9 +229,7 @@ fn the_gradients_of_the_whole_loss_are_its_slopes_where_nothing_counts_as_given(
 
 #[test]
 fn a_recipe_that_makes_no_sense_is_refused_by_key() {
-    let check = |text: &str| {
-        RmmNetTask::new(&Recipe::<RmmNetKind>::parse(text)?, None).map(drop)
-    };
+    let check = |text: &str| RmmNetTask::new(&Recipe::<RmmNetKind>::parse(text)?, None).map(drop);
     for (old, new, key) in [
         ("steps = 1001", "steps = 1", "data.steps"),
         ("points = 12.0", "points = 0.0", "data.points"),
