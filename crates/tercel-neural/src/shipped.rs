@@ -38,6 +38,8 @@ const FILES: &[(&str, &[u8])] = files![
     "kalman-net-straight-paper",
     "mnemonic",
     "neural-imm",
+    "rmmnet-aircraft",
+    "rmmnet-vehicle",
     "tr-mtt",
 ];
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::features::{EXTENT_SEEN, SCAN_SEEN, motion_seen};
+use super::published::Published;
 use super::regression::Identification;
 use super::track::{EXTENT, MOTION, SCAN};
 use super::view::POINT;
@@ -29,6 +30,8 @@ pub struct RmmNetHyper {
 pub enum Form {
     /// In the frame of the object, with the points themselves.
     Aligned(Aligned),
+    /// In the frame of the plane, as published.
+    Published(Published),
 }
 
 /// The network works in the frame of the object, and sees the points themselves.
@@ -90,34 +93,10 @@ impl Default for Aligned {
     }
 }
 
-impl RmmNetHyper {
-    /// The layers of the network, by name.
-    pub fn layers(&self) -> Vec<(String, LayerShape)> {
-        let Aligned { hidden, encoder, .. } = *self.aligned();
-        let linear = |name: &str, inputs, outputs| (name.to_owned(), LayerShape::Linear { inputs, outputs });
-        let sizes = self.sizes();
-        vec![
-            ("memory".to_owned(), LayerShape::Lstm { inputs: sizes.motion_seen, size: self.memory }),
-            linear("motion.hidden", self.memory + sizes.motion_seen, hidden),
-            linear("motion.output", hidden, sizes.motion_said),
-            linear("points.first", sizes.point, encoder),
-            linear("points.second", encoder, encoder),
-            linear("scan.hidden", 2 * encoder + sizes.scan_seen + self.memory, hidden),
-            linear("scan.output", hidden, sizes.scan_said),
-            linear("extent.hidden", hidden + sizes.extent_seen, hidden),
-            linear("extent.output", hidden, sizes.extent_said),
-        ]
-    }
-
-    /// The options of the form.
-    pub fn aligned(&self) -> &Aligned {
-        let Form::Aligned(form) = &self.form;
-        form
-    }
-
+impl Aligned {
     /// Widths of what is seen and said.
     pub fn sizes(&self) -> Sizes {
-        let order = self.aligned().identification.order;
+        let order = self.identification.order;
         Sizes {
             motion_seen: motion_seen(order),
             motion_said: MOTION + order,
@@ -126,6 +105,60 @@ impl RmmNetHyper {
             scan_said: SCAN,
             extent_seen: EXTENT_SEEN,
             extent_said: EXTENT,
+        }
+    }
+
+    fn layers(&self, memory: usize) -> Vec<(String, LayerShape)> {
+        let Aligned { hidden, encoder, .. } = *self;
+        let linear = |name: &str, inputs, outputs| (name.to_owned(), LayerShape::Linear { inputs, outputs });
+        let sizes = self.sizes();
+        vec![
+            ("memory".to_owned(), LayerShape::Lstm { inputs: sizes.motion_seen, size: memory }),
+            linear("motion.hidden", memory + sizes.motion_seen, hidden),
+            linear("motion.output", hidden, sizes.motion_said),
+            linear("points.first", sizes.point, encoder),
+            linear("points.second", encoder, encoder),
+            linear("scan.hidden", 2 * encoder + sizes.scan_seen + memory, hidden),
+            linear("scan.output", hidden, sizes.scan_said),
+            linear("extent.hidden", hidden + sizes.extent_seen, hidden),
+            linear("extent.output", hidden, sizes.extent_said),
+        ]
+    }
+
+    fn check(&self) -> Result<(), String> {
+        checked_sizes(&[("form.hidden", self.hidden), ("form.encoder", self.encoder)])?;
+        checked_positive(&[
+            ("form.velocity", self.velocity),
+            ("form.change", self.change),
+            ("form.standing", self.standing),
+            ("form.axes[0]", self.axes[0]),
+            ("form.axes[1]", self.axes[1]),
+            ("form.worth", self.worth),
+            ("form.speed", self.speed),
+            ("form.identification.kept", self.identification.kept),
+            ("form.identification.variance", self.identification.variance),
+            ("form.identification.residual", self.identification.residual),
+        ])?;
+        let Identification { order, kept, .. } = self.identification;
+        if order > LONGEST {
+            return Err(format!("`form.identification.order` is {order}; expected at most {LONGEST}"));
+        }
+        if kept > 1.0 {
+            return Err(format!("`form.identification.kept` is {kept}; it is a share, so at most 1"));
+        }
+        Ok(())
+    }
+}
+
+/// Most past velocities on which a motion may depend.
+pub(super) const LONGEST: usize = 64;
+
+impl RmmNetHyper {
+    /// The layers of the network, by name.
+    pub fn layers(&self) -> Vec<(String, LayerShape)> {
+        match &self.form {
+            Form::Aligned(form) => form.layers(self.memory),
+            Form::Published(form) => form.layers(self.memory),
         }
     }
 
@@ -147,33 +180,12 @@ impl RmmNetHyper {
     /// # Errors
     /// Names the option, what it is and what was expected.
     pub fn check(&self) -> Result<(), String> {
-        let form = self.aligned();
-        checked_sizes(&[
-            ("memory", self.memory),
-            ("form.hidden", form.hidden),
-            ("form.encoder", form.encoder),
-        ])?;
-        checked_positive(&[
-            ("interval", self.interval),
-            ("form.velocity", form.velocity),
-            ("form.change", form.change),
-            ("form.standing", form.standing),
-            ("form.axes[0]", form.axes[0]),
-            ("form.axes[1]", form.axes[1]),
-            ("form.worth", form.worth),
-            ("form.speed", form.speed),
-            ("form.identification.kept", form.identification.kept),
-            ("form.identification.variance", form.identification.variance),
-            ("form.identification.residual", form.identification.residual),
-        ])?;
-        let Identification { order, kept, .. } = form.identification;
-        if order > 64 {
-            return Err(format!("`form.identification.order` is {order}; expected at most 64"));
+        checked_sizes(&[("memory", self.memory)])?;
+        checked_positive(&[("interval", self.interval)])?;
+        match &self.form {
+            Form::Aligned(form) => form.check(),
+            Form::Published(form) => form.check(),
         }
-        if kept > 1.0 {
-            return Err(format!("`form.identification.kept` is {kept}; it is a share, so at most 1"));
-        }
-        Ok(())
     }
 
     /// The options of a model's card.

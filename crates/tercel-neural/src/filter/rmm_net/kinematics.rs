@@ -1,5 +1,7 @@
 //! The Gaussian of the state, in blocks.
 
+use tercel_core::extended::{Points, Scattering};
+
 use super::number::{Number, Symmetric};
 
 /// A Gaussian over `x, y, vx, vy`, in blocks of position and velocity.
@@ -129,4 +131,28 @@ impl<T: Number> Kinematics<T> {
             std::array::from_fn(|j| cross[i][j] - of_place[i] * of_velocity[j] * scale)
         });
     }
+}
+
+/// The state of a new object with these semi-axes (m) at the mean of a scan, whose velocity is not known but for its deviation
+/// (m/s), and the direction in which its points lie, rad.
+pub fn begin(points: &Points, scattering: &Scattering, axes: [f64; 2], speed: f64) -> (Kinematics<f64>, f64) {
+    let squares = axes.map(|axis| axis * axis);
+    let scatter = points.scatter();
+    let angle = 0.5 * (2.0 * scatter.m12).atan2(scatter.m11 - scatter.m22);
+    let extent = Symmetric { xx: squares[0], xy: 0.0, yy: squares[1] }.turned([angle.cos(), angle.sin()]);
+    let (scale, noise, count) = (scattering.scale(), scattering.noise(), points.count().max(1) as f64);
+    let place_covariance = Symmetric {
+        xx: (scale * extent.xx + noise.m11) / count,
+        xy: (scale * extent.xy + noise.m12) / count,
+        yy: (scale * extent.yy + noise.m22) / count,
+    };
+    let square = speed * speed;
+    let motion = Kinematics {
+        place: [points.mean().x, points.mean().y],
+        velocity: [0.0; 2],
+        place_covariance,
+        cross: [[0.0; 2]; 2],
+        velocity_covariance: Symmetric { xx: square, xy: 0.0, yy: square },
+    };
+    (motion, angle)
 }

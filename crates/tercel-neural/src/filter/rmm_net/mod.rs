@@ -4,9 +4,12 @@ mod belief;
 mod features;
 mod hyper;
 mod kinematics;
+mod layers;
 mod network;
 mod number;
+mod published;
 mod regression;
+mod steps;
 mod track;
 mod view;
 
@@ -21,15 +24,21 @@ use tercel_core::extended::{
 use tercel_core::filter::{Estimate, Filter, Innovation};
 use tercel_core::motion::ConstantVelocity;
 
-use super::memory::{Memory, Room};
+use super::memory::Memory;
 use belief::gaussian;
+use network::Layers;
 
 pub use belief::RmmNetBelief;
 pub use features::{Before, heading};
 pub use hyper::{Aligned, Form, RmmNetHyper, Sizes};
-pub use kinematics::Kinematics;
+pub use kinematics::{Kinematics, begin};
 pub use network::RmmNetwork;
 pub use number::{Number, Symmetric};
+pub use published::{Blocks, Extended, Moments, Published, Transition};
+/// Widths of what the form of the publication sees and says.
+pub mod widths {
+    pub use super::published::{ESTIMATE_SEEN, PREDICTED, PREDICTIONS, SAID, SCAN_SEEN};
+}
 pub use regression::{Identification, Regression};
 pub use track::{Length, Past, Report, Track};
 pub use view::View;
@@ -69,9 +78,6 @@ pub struct RmmNet {
 /// Points for which a new belief has room.
 const ROOM: usize = 64;
 
-/// Speed beyond which objects go straight, in units of a new object's.
-const FASTEST: f64 = 1e3;
-
 impl RmmNet {
     /// A filter of this network, for a sensor whose points spread so.
     pub fn new(network: Arc<RmmNetwork>, scattering: Scattering) -> Self {
@@ -83,33 +89,33 @@ impl RmmNet {
         &self.network
     }
 
-    fn options(&self) -> &Aligned {
-        self.network.hyper().aligned()
+    /// The first semi-axes, how many points they are worth, and the deviation of a first velocity.
+    fn beginning(&self) -> ([f64; 2], f64, f64) {
+        match &self.network.layers {
+            Layers::Aligned(layers) => {
+                let options = &layers.options;
+                (options.axes, options.worth, options.speed)
+            }
+            Layers::Published(layers) => {
+                let (extent, weight) = layers.options.first_extent();
+                ([extent.xx.sqrt(), extent.yy.sqrt()], weight, layers.options.speed)
+            }
+        }
     }
 
     /// The filter that compares scans with what is expected. Its motion is not used.
     fn classical(&self) -> Result<RandomMatrix<ConstantVelocity>, FilterError> {
-        let [along, across] = self.options().axes.map(|axis| axis * axis);
-        let prior = InverseWishart::new(Matrix2::new(along, 0.0, 0.0, across), self.options().worth)?;
+        let (axes, worth, speed) = self.beginning();
+        let prior =
+            InverseWishart::new(Matrix2::from_diagonal(&Vector2::from(axes.map(|axis| axis * axis))), worth)?;
         let evolution = Evolution::wishart(2.0, Freedom::Exact)?;
-        let motion = ConstantVelocity::new(0.0).with_speed(self.options().speed);
+        let motion = ConstantVelocity::new(0.0).with_speed(speed);
         Ok(RandomMatrix::new(motion, self.scattering, prior, evolution, Rule::Distorted))
     }
 
     fn compared(&self, belief: &RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
         let expected = GaussianInverseWishart { state: belief.state, extent: belief.extent()?, rate: None };
         self.classical()?.innovation(&expected, points)
-    }
-}
-
-fn finite(values: &[f32]) -> bool {
-    values.iter().all(|value| value.is_finite())
-}
-
-/// Outputs in double precision, on the stack: at most as many as a network of the largest history has.
-fn widened(said: &[f32], room: &mut [f64; 80]) {
-    for (to, from) in room.iter_mut().zip(said) {
-        *to = f64::from(*from);
     }
 }
 
@@ -120,19 +126,24 @@ impl Filter<4> for RmmNet {
     fn birth(&self, points: &Points) -> Result<RmmNetBelief, FilterError> {
         // The classical filter refuses what is no beginning.
         let _: GaussianInverseWishart<4> = self.classical()?.birth(points)?;
-        let options = self.options();
-        let (track, angle) = options.birth(points, &self.scattering);
+        let (axes, worth, speed) = self.beginning();
+        let (motion, angle) = begin(points, &self.scattering, axes, speed);
+        // As published, the extent of a new object lies along the axes of the plane.
+        let (angle, order) = match &self.network.layers {
+            Layers::Aligned(layers) => (angle, layers.options.identification),
+            Layers::Published(_) => (0.0, Identification { order: 0, ..Identification::default() }),
+        };
         let memory = vec![0.0; self.network.memory()];
         Ok(RmmNetBelief {
-            state: gaussian(&track.motion),
-            axes: track.axes,
-            worth: track.worth,
+            state: gaussian(&motion),
+            axes: axes.map(f64::ln),
+            worth,
             angle,
-            ln_weight: options.worth.ln(),
+            ln_weight: worth.ln(),
             held: angle,
             correction: [0.0; 4],
             measured: true,
-            regression: Regression::new(&options.identification),
+            regression: Regression::new(&order),
             memory: Memory::new(&memory, self.network.scratch()),
             room: belief::Room(vec![0.0; self.network.room(points.count().max(ROOM))]),
         })
@@ -142,45 +153,11 @@ impl Filter<4> for RmmNet {
         if dt == 0.0 {
             return;
         }
-        let (options, sizes) = (self.options(), self.network.hyper().sizes());
         let length = Length { dt, share: dt / self.network.hyper().interval };
-        let before = belief.track();
-        belief.regression.take(
-            &options.identification,
-            options.change,
-            before.motion.velocity,
-            belief.measured,
-        );
-        let known = Before { regression: &belief.regression, ..belief.before() };
-        let (next, scratch) = belief.memory.stage();
-        let mut room = Room(scratch);
-        let (seen, said) = (room.take(sizes.motion_seen), room.take(sizes.motion_said));
-        options.see_motion(&before, &known, seen);
-        self.network.say_motion(seen, next, room.0, said);
-        let [vx, vy] = before.motion.velocity;
-        // Weights of past velocities may let a speed grow for as long as nothing is measured.
-        let sound = finite(said) && finite(next) && vx.hypot(vy) < FASTEST * options.speed;
-        let mut wide = [0.0; 80];
-        if sound {
-            widened(said, &mut wide);
+        match &self.network.layers {
+            Layers::Aligned(layers) => layers.predict(belief, length),
+            Layers::Published(layers) => layers.predict(belief, dt),
         }
-        let wide = &wide[..sizes.motion_said];
-        if sound {
-            belief.memory.commit();
-        }
-        let past = Past {
-            heading: heading(options, before.motion.velocity, belief.angle),
-            velocities: belief.regression.past(),
-            expected: belief.regression.expected(),
-        };
-        let prior = before.predict(options, &past, wide, length);
-        let report = prior.foresee(options, belief.angle, wide);
-        belief.state = gaussian(&prior.motion);
-        // What cannot be saved is reported by the next update.
-        let _ = belief.state.settle();
-        belief.held = belief.angle;
-        belief.report(&prior, &report);
-        (belief.correction, belief.measured) = ([0.0; 4], false);
     }
 
     fn update(&self, belief: &mut RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
@@ -188,47 +165,11 @@ impl Filter<4> for RmmNet {
         if points.is_empty() {
             return Ok(innovation);
         }
-        let (options, sizes, count) = (self.options(), self.network.hyper().sizes(), points.count());
-        let prior = belief.track();
-        let noise = self.scattering.noise();
-        let view = View::new(options, &prior, belief.held, points, (self.scattering.scale(), &noise));
-        let needed = self.network.room(count);
-        if belief.room.0.len() < needed {
-            belief.room.0.resize(needed, 0.0);
+        match &self.network.layers {
+            Layers::Aligned(layers) => layers.update(belief, points, &self.scattering)?,
+            Layers::Published(layers) => layers.update(belief, points, &self.scattering)?,
         }
-        let rows = &mut belief.room.0[..needed];
-        view.see_points(&prior, points, &mut rows[..count * sizes.point]);
-        let (memory, scratch) = belief.memory.stage();
-        let mut room = Room(scratch);
-        let (seen, hidden) = (room.take(sizes.scan_seen), room.take(options.hidden));
-        let (said, seen_extent) = (room.take(sizes.scan_said), room.take(sizes.extent_seen));
-        let said_extent = room.take(sizes.extent_said);
-        options.see_scan(&prior, &view, seen);
-        self.network.say_scan((rows, count), seen, memory, room.0, (hidden, said));
-        let mut wide = [0.0; 80];
-        if finite(said) && finite(hidden) {
-            widened(said, &mut wide);
-        }
-        let mut after = prior.update(options, &view, &wide[..sizes.scan_said]);
-        options.see_extent(&after, &view, seen_extent);
-        self.network.say_extent(hidden, seen_extent, room.0, said_extent);
-        wide = [0.0; 80];
-        if finite(said_extent) {
-            widened(said_extent, &mut wide);
-        }
-        let report = after.settle_extent(options, &view, &wide[..sizes.extent_said]);
-        let mut state = gaussian(&after.motion);
-        state.settle()?;
-        let sound = after.axes.iter().chain([&after.worth, &report.angle]).all(|value| value.is_finite());
-        if !sound {
-            return Err(FilterError::NotFinite { what: "extent" });
-        }
-        for (i, correction) in belief.correction.iter_mut().enumerate() {
-            *correction += state.mean[i] - belief.state.mean[i];
-        }
-        belief.state = state;
         belief.measured = true;
-        belief.report(&after, &report);
         Ok(innovation)
     }
 

@@ -155,4 +155,27 @@ impl<T: Number> Symmetric<T> {
             yy: ss * self.xx + cc * self.yy + twice,
         }
     }
+
+    /// The symmetric root of a positive definite matrix.
+    pub fn root(&self) -> Self {
+        let determinant = self.determinant().sqrt();
+        let length = (self.xx + self.yy + determinant * 2.0).sqrt();
+        let scale = T::of(1.0) / length;
+        Symmetric {
+            xx: (self.xx + determinant) * scale,
+            xy: self.xy * scale,
+            yy: (self.yy + determinant) * scale,
+        }
+    }
+
+    /// The product with another, row by row.
+    pub(super) fn product(&self, other: &Self) -> [[T; 2]; 2] {
+        let columns = [[other.xx, other.xy], [other.xy, other.yy]].map(|column| self.times(column));
+        [[columns[0][0], columns[1][0]], [columns[0][1], columns[1][1]]]
+    }
+
+    /// `A M Aᵀ` with the rows of `A`.
+    pub(super) fn between(&self, a: &[[T; 2]; 2]) -> Self {
+        Symmetric { xx: self.form(a[0], a[0]), xy: self.form(a[0], a[1]), yy: self.form(a[1], a[1]) }
+    }
 }

@@ -1,7 +1,5 @@
 //! The step of the filter: prediction, update and extent, given what the network says.
 
-use tercel_core::extended::{Points, Scattering};
-
 use super::hyper::Aligned;
 use super::kinematics::Kinematics;
 use super::number::{Number, Symmetric, clamped, within};
@@ -238,29 +236,5 @@ impl Aligned {
             let own = self.axes[i].ln();
             clamped(axes[i], own - STRETCH.ln(), own + STRETCH.ln())
         })
-    }
-
-    /// The track of a new object at the mean of a scan of at least one point, and the direction of its extent.
-    pub fn birth(&self, points: &Points, scattering: &Scattering) -> (Track<f64>, f64) {
-        let squares = self.axes.map(|axis| axis * axis);
-        let scatter = points.scatter();
-        let angle = 0.5 * (2.0 * scatter.m12).atan2(scatter.m11 - scatter.m22);
-        let extent = Symmetric { xx: squares[0], xy: 0.0, yy: squares[1] }.turned([angle.cos(), angle.sin()]);
-        let (scale, noise, count) = (scattering.scale(), scattering.noise(), points.count().max(1) as f64);
-        let place_covariance = Symmetric {
-            xx: (scale * extent.xx + noise.m11) / count,
-            xy: (scale * extent.xy + noise.m12) / count,
-            yy: (scale * extent.yy + noise.m22) / count,
-        };
-        let square = self.speed * self.speed;
-        let motion = Kinematics {
-            place: [points.mean().x, points.mean().y],
-            velocity: [0.0; 2],
-            place_covariance,
-            cross: [[0.0; 2]; 2],
-            velocity_covariance: Symmetric { xx: square, xy: 0.0, yy: square },
-        };
-        let track = Track { motion, axes: self.axes.map(f64::ln), worth: self.worth };
-        (track, angle)
     }
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use tercel_neural::filter::rmm_net::{Number, Symmetric};
 
-use super::rows::{STEP, TRACK, track};
+use super::rows::Estimate;
 use crate::TrainError;
 use crate::check::{at_least, positive};
 use crate::tape::Variable;
@@ -14,6 +14,7 @@ use crate::tape::Variable;
 /// ```text
 /// L = s · (eᵀ P⁻¹ e + ln |P|) / 2 + m · (|e_p|² / p² + |e_v|² / v²)
 ///   + g · d²(X̂, X) / a² + w · -ln p(X; X̂, λ) + f · the last two of the extent that was expected
+///   + q · (|e|² + x |X̂ - X|²) / 2                       as published (eq. 37), with x = 1
 /// ```
 /// with the squared Wasserstein distance `d²` of the shapes alone and the geometric mean `a` of the true semi-axes. The mean
 /// extent counts as given in the logarithmic score, which therefore sets the weight alone.
@@ -34,7 +35,11 @@ pub struct Costs {
     pub score: f64,
     /// Weight `f` of the extent that is expected before an update.
     pub foresight: f64,
-    /// Steps between cuts of the back-propagation.
+    /// Weight `q` of the loss of the publication.
+    pub squares: f64,
+    /// Weight `x` of squared errors of the extent in it, 1/m².
+    pub extent: f64,
+    /// Steps between cuts of the back-propagation; 0 cuts nothing.
     pub window: usize,
 }
 
@@ -48,6 +53,8 @@ impl Default for Costs {
             shape: 2.0,
             score: 0.05,
             foresight: 0.05,
+            squares: 0.0,
+            extent: 1.0,
             window: 50,
         }
     }
@@ -69,6 +76,8 @@ impl Costs {
             ("shape", self.shape),
             ("score", self.score),
             ("foresight", self.foresight),
+            ("squares", self.squares),
+            ("extent", self.extent),
         ] {
             at_least(&format!("loss.{key}"), value, 0.0)?;
         }
@@ -76,44 +85,53 @@ impl Costs {
         positive("loss.velocity", self.velocity)
     }
 
-    /// The cost of a row of a step.
-    pub fn of<'t>(&self, row: &[Variable<'t>], truth: &Truth) -> Variable<'t> {
-        debug_assert_eq!(row.len(), STEP);
-        let track = track(row);
-        let e: [Variable<'t>; 4] = std::array::from_fn(|i| row[i] + -truth.state[i]);
-        let (pp, rest) = (track.motion.place_covariance, track.motion.velocity_given_place());
-        let place = [e[0], e[1]];
-        let shift = track.motion.velocity_shift(place);
-        let left = [e[2] - shift[0], e[3] - shift[1]];
+    /// The cost of an estimate.
+    pub fn of<'t>(&self, found: &Estimate<Variable<'t>>, truth: &Truth) -> Variable<'t> {
+        let motion = &found.motion;
+        let off = |found: [Variable<'t>; 2], first: usize| {
+            [found[0] + -truth.state[first], found[1] + -truth.state[first + 1]]
+        };
+        let (place, velocity) = (off(motion.place, 0), off(motion.velocity, 2));
+        // The velocity is judged where the position is known.
+        let (pp, rest) = (motion.place_covariance, motion.velocity_given_place());
+        let shift = motion.velocity_shift(place);
+        let left = [velocity[0] - shift[0], velocity[1] - shift[1]];
         let square = pp.inverse().form(place, place) + rest.inverse().form(left, left);
         let surprise = (square + pp.determinant().ln() + rest.determinant().ln()) * 0.5;
-        let of_place = (e[0] * e[0] + e[1] * e[1]) * (1.0 / (self.position * self.position));
-        let of_velocity = (e[2] * e[2] + e[3] * e[3]) * (1.0 / (self.velocity * self.velocity));
-        let found = self.of_extent([row[TRACK], row[TRACK + 1], row[14], row[15]], &truth.extent);
-        let expected =
-            self.of_extent([row[TRACK + 2], row[TRACK + 3], row[TRACK + 4], row[TRACK + 5]], &truth.extent);
-        surprise * self.surprise + (of_place + of_velocity) * self.error + found + expected * self.foresight
+        let [place, velocity] = [place, velocity].map(|e| e[0] * e[0] + e[1] * e[1]);
+        let [p, v] = [self.position, self.velocity].map(|unit| 1.0 / (unit * unit));
+        let mut cost = surprise * self.surprise
+            + (place * p + velocity * v) * self.error
+            + self.of_extent(&found.extent, found.ln_weight, truth);
+        if let Some((extent, ln_weight)) = &found.expected {
+            cost = cost + self.of_extent(extent, *ln_weight, truth) * self.foresight;
+        }
+        if self.squares > 0.0 {
+            let x = &found.extent;
+            let off = [x.xx + -truth.extent.xx, x.xy + -truth.extent.xy, x.yy + -truth.extent.yy];
+            let norm = off[0] * off[0] + off[1] * off[1] * 2.0 + off[2] * off[2];
+            cost = cost + (place + velocity + norm * self.extent) * (0.5 * self.squares);
+        }
+        cost
     }
 
-    /// Costs of an extent, of its angle, the logarithm of its weight, and those of its axes.
     fn of_extent<'t>(
         &self,
-        [angle, ln_weight, along, across]: [Variable<'t>; 4],
-        truth: &Symmetric<f64>,
+        extent: &Symmetric<Variable<'t>>,
+        ln_weight: Variable<'t>,
+        truth: &Truth,
     ) -> Variable<'t> {
-        let size = truth.determinant().sqrt();
-        let axes = [along, across].map(|axis| (axis * 2.0).exp());
-        let zero = Variable::of(0.0);
-        let extent = Symmetric { xx: axes[0], xy: zero, yy: axes[1] }.turned([angle.cos(), angle.sin()]);
-        self.distance(&extent, truth) * (self.shape / size) + score(&extent, ln_weight, truth) * self.score
+        let size = truth.extent.determinant().sqrt();
+        distance(extent, &truth.extent) * (self.shape / size)
+            + score(extent, ln_weight, &truth.extent) * self.score
     }
+}
 
-    /// The squared Wasserstein distance of the shapes.
-    fn distance<'t>(&self, extent: &Symmetric<Variable<'t>>, truth: &Symmetric<f64>) -> Variable<'t> {
-        let product = extent.xx * truth.xx + extent.xy * (2.0 * truth.xy) + extent.yy * truth.yy;
-        let root = (extent.determinant() * truth.determinant()).sqrt();
-        extent.xx + extent.yy + (truth.xx + truth.yy) - (product + root * 2.0).sqrt() * 2.0
-    }
+/// The squared Wasserstein distance of the shapes.
+pub fn distance<T: Number>(extent: &Symmetric<T>, truth: &Symmetric<f64>) -> T {
+    let product = extent.xx * truth.xx + extent.xy * (2.0 * truth.xy) + extent.yy * truth.yy;
+    let root = (extent.determinant() * truth.determinant()).sqrt();
+    extent.xx + extent.yy + (truth.xx + truth.yy) + -((product + root * 2.0).sqrt() * 2.0)
 }
 
 /// Minus the logarithm of the density of the truth under an inverse Wishart belief, with the mean as given.

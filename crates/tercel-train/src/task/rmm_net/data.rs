@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use tercel_core::extended::{Points, Scattering};
-use tercel_neural::filter::rmm_net::{Aligned, Kinematics, Symmetric, Track};
+use tercel_neural::filter::rmm_net::{Kinematics, Symmetric, begin};
 use tercel_sim::extended::{Generator, Heading, Ride, Scatterers, Sizes, Vehicle};
 
 use super::cost::Truth;
@@ -215,8 +215,8 @@ impl RmmNetData {
 pub struct Rides {
     /// The number of objects.
     pub members: usize,
-    /// The first tracks and directions.
-    pub births: Vec<(Track<f64>, f64)>,
+    /// The first states, and the directions of the first scans.
+    pub births: Vec<(Kinematics<f64>, f64)>,
     /// Points, by step and member. Those of the first step are in the births.
     pub scans: Vec<Vec<Points>>,
     /// The truth, by step and member.
@@ -224,14 +224,14 @@ pub struct Rides {
 }
 
 impl Rides {
-    /// The objects of a draw.
+    /// The objects of a draw, which begin with these semi-axes (m) and this deviation of the velocity (m/s).
     ///
     /// # Errors
     ///
     /// If one cannot be simulated, or tracks are missing or too short.
     pub fn new(
         data: &RmmNetData,
-        options: &Aligned,
+        (axes, speed): ([f64; 2], f64),
         tracks: &Tracks,
         draw: Draw<'_>,
     ) -> Result<Self, TrainError> {
@@ -265,11 +265,11 @@ impl Rides {
             }
             let first = rides.scans[0].last().map_or_else(Points::default, Points::clone);
             let born = learning && random.random::<f64>() < data.born;
-            let (mut track, angle) = options.birth(&first, &scattering);
+            let (mut motion, angle) = begin(&first, &scattering, axes, speed);
             if !born {
                 let state = ride.states()[0];
                 let own = Symmetric { xx: START, xy: 0.0, yy: START };
-                track.motion = Kinematics {
+                motion = Kinematics {
                     place: [state.x, state.y],
                     velocity: [state.z, state.w],
                     place_covariance: own,
@@ -277,7 +277,7 @@ impl Rides {
                     velocity_covariance: own,
                 };
             }
-            rides.births.push((track, angle));
+            rides.births.push((motion, angle));
         }
         Ok(rides)
     }

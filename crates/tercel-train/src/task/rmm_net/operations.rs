@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use tercel_neural::filter::rmm_net::{Aligned, Length, Number, Past, View};
+use tercel_neural::filter::rmm_net::{Aligned, Length, Moments, Number, Past, Published, View};
 
 use super::cost::{Costs, Truth};
-use super::rows::{STEP, TRACK, step, track};
+use super::rows::{EXTENDED, Layout, STEP, extended, extended_numbers, step, track};
 use crate::backend::{Forward, Matrix, Operation, Past as Before};
 use crate::tape::{Tape, Variable};
 
@@ -30,56 +30,59 @@ pub struct Step {
     pub given: Arc<Vec<Given>>,
 }
 
-impl Step {
-    fn take<T: Number>(&self, member: usize, before: &[T], said: [&[T]; 3]) -> [T; STEP] {
+impl Rows<4, STEP> for Step {
+    fn of<T: Number>(&self, member: usize, [before, motion, scan, extent]: [&[T]; 4]) -> [T; STEP] {
         let given = &self.given[member];
         let past = Past { heading: given.heading, velocities: &given.velocities, expected: given.expected };
-        let prior = track(before).predict(&self.options, &past, said[0], self.length);
-        let expected = prior.foresee(&self.options, given.held, said[0]);
+        let prior = track(before).predict(&self.options, &past, motion, self.length);
+        let expected = prior.foresee(&self.options, given.held, motion);
         match &given.view {
             None => step(&prior, &expected, &expected, &prior),
             Some(view) => {
-                let mut after = prior.update(&self.options, view, said[1]);
-                let found = after.settle_extent(&self.options, view, said[2]);
+                let mut after = prior.update(&self.options, view, scan);
+                let found = after.settle_extent(&self.options, view, extent);
                 step(&after, &found, &expected, &prior)
             }
         }
     }
 }
 
+fn variables<'t>(tape: &'t Tape, row: &[f32]) -> Vec<Variable<'t>> {
+    row.iter().map(|x| tape.variable(f64::from(*x))).collect()
+}
+
 fn row(matrix: &Matrix, member: usize) -> &[f32] {
     &matrix.values()[member * matrix.columns()..][..matrix.columns()]
 }
 
-impl Operation<4> for Step {
-    type Saved = ();
+/// A step of single numbers on the rows of some inputs, which gives `WIDTH` numbers for each member.
+pub trait Rows<const N: usize, const WIDTH: usize> {
+    /// The step of one member.
+    fn of<T: Number>(&self, member: usize, inputs: [&[T]; N]) -> [T; WIDTH];
 
-    fn forward(&self, inputs: &[Matrix; 4]) -> Forward<()> {
+    /// The step of all members.
+    fn values(&self, inputs: &[Matrix; N]) -> Forward<()> {
         let members = inputs[0].rows();
-        let mut values = Vec::with_capacity(members * STEP);
+        let mut values = Vec::with_capacity(members * WIDTH);
         for member in 0..members {
-            let [before, motion, scan, extent] = inputs
-                .each_ref()
-                .map(|input| row(input, member).iter().map(|x| f64::from(*x)).collect::<Vec<_>>());
-            let after = self.take(member, &before, [&motion, &scan, &extent]);
-            values.extend(after.map(|value| value as f32));
+            let wide = |input: &Matrix| row(input, member).iter().map(|x| f64::from(*x)).collect::<Vec<_>>();
+            let inputs = inputs.each_ref().map(wide);
+            let found = self.of(member, inputs.each_ref().map(Vec::as_slice));
+            values.extend(found.map(|value| value as f32));
         }
-        Forward { values, shape: [members, STEP], saved: () }
+        Forward { values, shape: [members, WIDTH], saved: () }
     }
 
-    fn backward(&self, past: Before<'_, (), 4>, gradient: &[f32]) -> [Option<Vec<f32>>; 4] {
-        let members = past.inputs[0].rows();
-        let mut found = past.inputs.each_ref().map(|input| vec![0.0_f32; input.rows() * input.columns()]);
+    /// The gradients with respect to the inputs, given that of the values.
+    fn slopes(&self, inputs: &[Matrix; N], gradient: &[f32]) -> [Option<Vec<f32>>; N] {
+        let mut found = inputs.each_ref().map(|input| vec![0.0_f32; input.rows() * input.columns()]);
         let (mut tape, mut slopes) = (Tape::default(), Vec::new());
-        for member in 0..members {
+        for member in 0..inputs[0].rows() {
             tape.clear();
-            let inputs = past.inputs.each_ref().map(|input| {
-                row(input, member).iter().map(|x| tape.variable(f64::from(*x))).collect::<Vec<Variable<'_>>>()
-            });
-            let after = self.take(member, &inputs[0], [&inputs[1], &inputs[2], &inputs[3]]);
-            let given = &gradient[member * STEP..][..STEP];
-            let weighed: Vec<_> =
-                after.into_iter().zip(given).map(|(value, weight)| (value, f64::from(*weight))).collect();
+            let inputs = inputs.each_ref().map(|input| variables(&tape, row(input, member)));
+            let values = self.of(member, inputs.each_ref().map(Vec::as_slice));
+            let given = gradient[member * WIDTH..].iter().map(|weight| f64::from(*weight));
+            let weighed: Vec<_> = values.into_iter().zip(given).collect();
             tape.slopes(&weighed, &mut slopes);
             for (found, inputs) in found.iter_mut().zip(&inputs) {
                 let found = &mut found[member * inputs.len()..][..inputs.len()];
@@ -89,6 +92,47 @@ impl Operation<4> for Step {
             }
         }
         found.map(Some)
+    }
+}
+
+impl Operation<4> for Step {
+    type Saved = ();
+
+    fn forward(&self, inputs: &[Matrix; 4]) -> Forward<()> {
+        self.values(inputs)
+    }
+
+    fn backward(&self, past: Before<'_, (), 4>, gradient: &[f32]) -> [Option<Vec<f32>>; 4] {
+        self.slopes(past.inputs, gradient)
+    }
+}
+
+/// The same of the form of the publication: of states and extents and what the network says of prediction and scan.
+#[derive(Debug, Clone)]
+pub struct PublishedStep {
+    pub options: Arc<Published>,
+    pub dt: f64,
+    /// The scans, where they have points.
+    pub seen: Arc<Vec<Option<Moments>>>,
+}
+
+impl Rows<3, EXTENDED> for PublishedStep {
+    fn of<T: Number>(&self, member: usize, [before, prediction, scan]: [&[T]; 3]) -> [T; EXTENDED] {
+        let prior = extended(before).predict(&self.options, prediction, self.dt);
+        let after = self.seen[member].as_ref().map(|seen| prior.update(&self.options, seen, scan));
+        extended_numbers(&after.unwrap_or(prior))
+    }
+}
+
+impl Operation<3> for PublishedStep {
+    type Saved = ();
+
+    fn forward(&self, inputs: &[Matrix; 3]) -> Forward<()> {
+        self.values(inputs)
+    }
+
+    fn backward(&self, past: Before<'_, (), 3>, gradient: &[f32]) -> [Option<Vec<f32>>; 3] {
+        self.slopes(past.inputs, gradient)
     }
 }
 
@@ -149,10 +193,11 @@ impl Operation<1> for Pool {
     }
 }
 
-/// The cost of each row of [`STEP`] numbers, given the truth.
+/// The cost of each row, given the truth.
 #[derive(Debug, Clone)]
 pub struct Judge {
     pub costs: Costs,
+    pub layout: Layout,
     pub truth: Arc<Vec<Truth>>,
 }
 
@@ -160,26 +205,22 @@ impl Operation<1> for Judge {
     type Saved = ();
 
     fn forward(&self, [rows]: &[Matrix; 1]) -> Forward<()> {
-        let tape = Tape::default();
         let cost = |member: usize| {
-            let row: Vec<Variable<'_>> =
-                row(rows, member).iter().map(|x| Variable::of(f64::from(*x))).collect();
-            let _ = &tape;
-            self.costs.of(&row, &self.truth[member]).value() as f32
+            let constant = |x: &f32| Variable::of(f64::from(*x));
+            let row: Vec<Variable<'_>> = row(rows, member).iter().map(constant).collect();
+            self.costs.of(&self.layout.read(&row), &self.truth[member]).value() as f32
         };
-        let values: Vec<f32> = (0..rows.rows()).map(cost).collect();
-        Forward { values, shape: [rows.rows(), 1], saved: () }
+        Forward { values: (0..rows.rows()).map(cost).collect(), shape: [rows.rows(), 1], saved: () }
     }
 
     fn backward(&self, past: Before<'_, (), 1>, gradient: &[f32]) -> [Option<Vec<f32>>; 1] {
         let [rows] = past.inputs;
-        let mut found = Vec::with_capacity(rows.rows() * TRACK);
+        let mut found = Vec::with_capacity(rows.rows() * rows.columns());
         let (mut tape, mut slopes) = (Tape::default(), Vec::new());
         for (member, weight) in gradient.iter().enumerate() {
             tape.clear();
-            let row: Vec<Variable<'_>> =
-                row(rows, member).iter().map(|x| tape.variable(f64::from(*x))).collect();
-            let cost = self.costs.of(&row, &self.truth[member]);
+            let row = variables(&tape, row(rows, member));
+            let cost = self.costs.of(&self.layout.read(&row), &self.truth[member]);
             tape.slopes(&[(cost, f64::from(*weight))], &mut slopes);
             found.extend(row.iter().map(|input| slopes[input.place()] as f32));
         }

@@ -1,6 +1,6 @@
 //! Rows of numbers that stand for what the recursion carries, in single precision between the operations.
 
-use tercel_neural::filter::rmm_net::{Kinematics, Number, Report, Track};
+use tercel_neural::filter::rmm_net::{Extended, Kinematics, Number, Report, Symmetric, Track};
 
 /// Numbers of a Gaussian.
 pub const MOTION: usize = 14;
@@ -47,4 +47,70 @@ pub fn step<T: Number>(
         Some(4) => before.axes[0],
         _ => before.axes[1],
     })
+}
+
+/// Numbers of a row of the form of the publication: the state, the mean extent and its weight.
+pub const EXTENDED: usize = MOTION + 4;
+
+/// The numbers of a state and extent as published.
+pub fn extended_numbers<T: Number>(estimate: &Extended<T>) -> [T; EXTENDED] {
+    let (motion, extent) = (estimate.motion.numbers(), &estimate.extent);
+    let rest = [extent.xx, extent.xy, extent.yy, estimate.weight];
+    std::array::from_fn(|i| if i < MOTION { motion[i] } else { rest[i - MOTION] })
+}
+
+/// State and extent of such a row.
+pub fn extended<T: Number>(row: &[T]) -> Extended<T> {
+    let extent = Symmetric { xx: row[MOTION], xy: row[MOTION + 1], yy: row[MOTION + 2] };
+    Extended { motion: Kinematics::of(row), extent, weight: row[MOTION + 3] }
+}
+
+/// What stands in the rows of a form.
+#[derive(Debug, Clone, Copy)]
+pub enum Layout {
+    Aligned,
+    Published,
+}
+
+/// What a row says of an object.
+pub struct Estimate<T> {
+    pub motion: Kinematics<T>,
+    pub extent: Symmetric<T>,
+    pub ln_weight: T,
+    /// The extent that was expected, and the logarithm of its weight.
+    pub expected: Option<(Symmetric<T>, T)>,
+}
+
+impl Layout {
+    /// Numbers of a row.
+    pub fn width(self) -> usize {
+        match self {
+            Layout::Aligned => STEP,
+            Layout::Published => EXTENDED,
+        }
+    }
+
+    /// What a row says.
+    pub fn read<T: Number>(self, row: &[T]) -> Estimate<T> {
+        match self {
+            Layout::Aligned => {
+                let track = track(row);
+                let extent = |[along, across]: [T; 2], angle: T| {
+                    let [xx, yy] = [along, across].map(|axis| (axis * 2.0).exp());
+                    Symmetric { xx, xy: T::of(0.0), yy }.turned([angle.cos(), angle.sin()])
+                };
+                let expected = extent([row[TRACK + 4], row[TRACK + 5]], row[TRACK + 2]);
+                Estimate {
+                    motion: track.motion,
+                    extent: extent(track.axes, row[TRACK]),
+                    ln_weight: row[TRACK + 1],
+                    expected: Some((expected, row[TRACK + 3])),
+                }
+            }
+            Layout::Published => {
+                let Extended { motion, extent, weight } = extended(row);
+                Estimate { motion, extent, ln_weight: weight.ln(), expected: None }
+            }
+        }
+    }
 }

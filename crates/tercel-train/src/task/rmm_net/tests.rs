@@ -2,10 +2,14 @@ use nalgebra::Vector4;
 use tercel_core::belief::Gaussian;
 use tercel_core::extended::Points;
 use tercel_core::filter::Filter;
-use tercel_neural::filter::rmm_net::{Kinematics, Symmetric};
+use tercel_neural::filter::rmm_net::{Kinematics, Symmetric, Track, View};
 use tercel_neural::filter::{RmmNet, RmmNetBelief, RmmNetwork};
 
+use super::operations::{Given, Step};
+use super::rows::{TRACK, numbers};
 use super::*;
+use crate::Initial;
+use crate::backend::values;
 use crate::task::repository;
 
 const RECIPE: &str = "
@@ -60,31 +64,66 @@ fn the_filter_does_what_was_trained() {
     agree(&task, &set, 1000);
 }
 
+/// The same recipe in the form of the publication.
+fn published(options: &str) -> String {
+    let start = RECIPE.find("[model.form]").unwrap();
+    let end = RECIPE.find("[loss]").unwrap();
+    let form = format!("[model.form]\nkind = \"published\"\n{options}\n");
+    format!("{}{form}[loss]\nsquares = 1.0\nwindow = 4\n", &RECIPE[..start]).replace("1001", "401")
+        + &RECIPE[end..end]
+}
+
+#[test]
+fn the_filter_of_the_publication_does_what_was_trained_whatever_blocks_it_has() {
+    for options in [
+        "",
+        "blocks = { memory = false }",
+        "blocks = { prediction = false }\ntransition = \"keeping\"",
+        "blocks = { update = false }",
+        "transition = \"turning\"\ndistorted = true\nprinted = false",
+    ] {
+        let (task, set) = task(&published(options));
+        agree(&task, &set, 400);
+    }
+}
+
 #[test]
 fn the_shipped_models_do_what_was_trained() {
     for (model, text) in repository::models(RmmNetKind::NAME) {
         let mut recipe = Recipe::<RmmNetKind>::parse(&text).unwrap();
         recipe.data.steps = 1001;
-        if let Source::Tracks { .. } = recipe.data.source {
-            recipe.data.source =
-                Source::Vehicles { generators: vec![Population::Smooth], mixed: 0.0, fresh: false };
-            (recipe.data.interval, recipe.model.interval) = (1.0, 1.0);
-        }
-        let (task, mut set) = RmmNetTask::new(&recipe, None).unwrap();
+        let (task, mut set) = RmmNetTask::new(&recipe, Some(flights(1001))).unwrap();
         repository::fill(&mut set, &model);
         agree(&task, &set, 1000);
     }
+}
+
+/// Aircraft that turn slowly, with a speed that is never quite the same, every four seconds.
+fn flights(steps: usize) -> Tracks {
+    let flight = |number: usize| {
+        let mut place = nalgebra::Vector2::zeros();
+        let state = |step: usize| {
+            let (k, phase) = (step as f64, 0.7 * number as f64);
+            let (course, speed) =
+                (0.02 * k + (0.05 * k + phase).sin(), 100.0 + 12.0 * (2.1 * k + phase).sin());
+            let velocity = nalgebra::Vector2::new(course.cos(), course.sin()) * speed;
+            place += velocity * 4.0;
+            Vector4::new(place.x, place.y, velocity.x, velocity.y)
+        };
+        (0..steps).map(state).collect()
+    };
+    Tracks::new((0..10).map(flight).collect())
 }
 
 /// Compares the differentiable model and the filter over some steps of three objects.
 fn agree(task: &RmmNetTask, set: &ParameterSet, steps: usize) {
     let rides = task.batch(draw(&[1, 2, 3])).unwrap();
     let model = Model::new(task.card(), set.tensors()).unwrap();
-    let filter = RmmNet::new(Arc::new(RmmNetwork::from_model(&model).unwrap()), task.scattering);
+    let scattering = task.data.scattering().unwrap();
+    let filter = RmmNet::new(Arc::new(RmmNetwork::from_model(&model).unwrap()), scattering);
     let begin = |member: usize| -> RmmNetBelief {
         let mut belief = filter.birth(&rides.scans[0][member]).unwrap();
-        let row: Vec<f64> = numbers(&rides.births[member].0).to_vec();
-        filter.set_state(&mut belief, &gaussian(&row));
+        filter.set_state(&mut belief, &gaussian(&rides.births[member].0));
         belief
     };
     let mut beliefs: Vec<_> = (0..3).map(begin).collect();
@@ -97,27 +136,32 @@ fn agree(task: &RmmNetTask, set: &ParameterSet, steps: usize) {
         for (member, belief) in beliefs.iter_mut().enumerate() {
             filter.predict(belief, task.data.interval);
             filter.update(belief, &rides.scans[step][member]).unwrap();
-            let row: Vec<f64> = found[member * STEP..][..STEP].iter().map(|x| f64::from(*x)).collect();
-            let (ran, trained) = (filter.state(belief), gaussian(&row));
+            let width = task.layout().width();
+            let row: Vec<f64> = found[member * width..][..width].iter().map(|x| f64::from(*x)).collect();
+            let said = task.layout().read(&row);
+            let (ran, trained) = (filter.state(belief), gaussian(&said.motion));
             for i in 0..4 {
                 let error = (trained.mean[i] - ran.mean[i]).abs();
-                let scale = ran.mean[i].abs().max(10.0) + ran.deviations()[i];
+                // Relative to the length of the vector: its direction is anybody's.
+                let pair = i / 2 * 2;
+                let scale = ran.mean[pair].hypot(ran.mean[pair + 1]).max(10.0) + ran.deviations()[i];
                 assert!(error < 1e-4 * scale, "step {step}, member {member}, {i}: {error}");
             }
             let off = (trained.covariance - ran.covariance).norm() / ran.covariance.norm();
             assert!(off < 1e-3, "step {step}, member {member}: {off}");
-            let turned = (2.0 * (row[TRACK] - belief.angle())).sin().abs();
-            assert!(turned < 1e-3, "step {step}, member {member}: {turned}");
-            for (axis, ran) in row[14..16].iter().zip(belief.axes()) {
-                assert!((axis.exp() / ran - 1.0).abs() < 1e-4, "step {step}, member {member}: {ran}");
-            }
+            let extent = filter.extent(belief).unwrap();
+            let trained =
+                nalgebra::Matrix2::new(said.extent.xx, said.extent.xy, said.extent.xy, said.extent.yy);
+            let off = (trained - extent.mean()).norm() / extent.mean().norm();
+            assert!(off < 1e-3, "step {step}, member {member}: {off}");
+            let off = (said.ln_weight.exp() / extent.weight() - 1.0).abs();
+            assert!(off < 1e-3, "step {step}, member {member}: weight {off}");
         }
     }
 }
 
-fn gaussian(row: &[f64]) -> Gaussian<4> {
-    let Kinematics { place, velocity, place_covariance: pp, cross: c, velocity_covariance: vv } =
-        Kinematics::of(row);
+fn gaussian(motion: &Kinematics<f64>) -> Gaussian<4> {
+    let Kinematics { place, velocity, place_covariance: pp, cross: c, velocity_covariance: vv } = motion;
     Gaussian {
         mean: Vector4::new(place[0], place[1], velocity[0], velocity[1]),
         covariance: nalgebra::Matrix4::new(
@@ -135,7 +179,8 @@ fn the_gradients_of_a_step_and_its_cost_are_their_slopes() {
     // In the score of the extent its mean counts as given.
     task.costs.score = 0.0;
     let rides = task.batch(draw(&[1, 2, 5])).unwrap();
-    let (options, sizes) = (&task.options, task.hyper.sizes());
+    let Net::Aligned(net) = &task.net else { panic!("another form") };
+    let (options, sizes) = (&net.options, net.options.sizes());
     let step = (1..200).find(|step| rides.scans[*step].iter().any(Points::is_empty)).unwrap();
     let mut tracks = Vec::new();
     let mut given = Vec::new();
@@ -158,14 +203,15 @@ fn the_gradients_of_a_step_and_its_cost_are_their_slopes() {
         };
         let track = Track { motion, axes: [1.6, 0.3], worth: 9.0 };
         let points = &rides.scans[step][member];
-        let scattering = (0.25, &task.scattering.noise());
+        let scattering = (0.25, &net.scattering.noise());
         let view = (!points.is_empty()).then(|| View::new(options, &track, 0.3, points, scattering));
         tracks.extend(numbers(&track).map(|x| x as f32));
         let velocities = (0..5).map(|i| [f64::from(i).sin(), 2.0 * f64::from(i).cos()]).collect();
         given.push(Given { heading: [0.6, 0.8], velocities, expected: [1.5, -0.5], held: 0.3, view });
     }
-    let operation = Step { options: Arc::clone(options), length: task.length(), given: Arc::new(given) };
-    let judge = Judge { costs: task.costs, truth: Arc::new(rides.truth[step].clone()) };
+    let operation = Step { options: Arc::clone(options), length: net.length, given: Arc::new(given) };
+    let judge =
+        Judge { costs: task.costs, layout: task.layout(), truth: Arc::new(rides.truth[step].clone()) };
     let mut set = ParameterSet::new(1);
     set.add("tracks", &[3, TRACK], Initial::Values(tracks)).unwrap();
     for (name, width) in
@@ -207,7 +253,8 @@ fn the_gradients_of_the_whole_loss_are_its_slopes_where_nothing_counts_as_given(
     let rides = task.batch(draw(&[1, 2, 3])).unwrap();
     let loss = |weights: &Weights| {
         let (_, row) = task.step(weights, &rides, task.first(&rides), 1);
-        let judge = Judge { costs: task.costs, truth: Arc::new(rides.truth[1].clone()) };
+        let judge =
+            Judge { costs: task.costs, layout: task.layout(), truth: Arc::new(rides.truth[1].clone()) };
         apply(judge, [row]).mean().reshape([1, 1])
     };
     let weights = Weights::trainable(&set);
