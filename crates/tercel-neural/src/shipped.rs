@@ -39,6 +39,7 @@ const FILES: &[(&str, &[u8])] = files![
     "mnemonic",
     "neural-imm",
     "rmmnet-aircraft",
+    "rmmnet-crossing",
     "rmmnet-vehicle",
     "tr-mtt",
 ];
