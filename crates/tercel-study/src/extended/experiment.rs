@@ -82,6 +82,13 @@ impl ExtendedExperiment {
         Self::new("vehicle", Scene::Vehicle(vehicle), &settings, options, drawn, request.methods)
     }
 
+    /// The study `vehicle-ablation`: what the blocks of RMMNet are worth.
+    pub(crate) fn ablation(request: &Request<'_>) -> Result<Self, StudyError> {
+        let scene = Scene::Vehicle(Vehicle::new(Generator::Reject));
+        let drawn = (request.seed, request.runs);
+        Self::new("vehicle-ablation", scene, &Settings::REJECT, BTreeMap::new(), drawn, request.methods)
+    }
+
     /// The study `aircraft`.
     pub(crate) fn aircraft(request: &Request<'_>) -> Result<Self, StudyError> {
         let heading = match request.set {
@@ -92,6 +99,7 @@ impl ExtendedExperiment {
         // The study asks for data before it is built.
         let path = request.data.unwrap_or(std::path::Path::new(""));
         let aircraft = Aircraft::read(path, heading, true)?;
+        let aircraft = if request.set == "even" { aircraft.evened() } else { aircraft };
         let count = aircraft.count() as u64;
         if request.chosen_runs && request.runs > count {
             let runs = request.runs;
