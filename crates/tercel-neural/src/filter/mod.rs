@@ -7,6 +7,7 @@
 //! | [`EnsKNets`] | the mixture of KalmanNets, with or without attention | that of each KalmanNet, memories of two branches |
 //! | [`LiquidKalman`] | the motion, in a network of continuous time or a control | Gaussian, memory of the network |
 //! | [`MnemonicKalman`] | the prediction | Gaussian, memory of a recurrent network |
+//! | [`RmmNet`] | motion, reading of the points and extent of an extended object | Gaussian, extent, memory of a recurrent network |
 //! | [`TrMtt`] | everything, from a window of measurements | last measurements, Gaussian |
 //! | [`NeuralImm`] | the mixture of a bank of turns | that of the bank, memory of a recurrent network |
 //!

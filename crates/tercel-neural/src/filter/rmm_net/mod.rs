@@ -50,25 +50,53 @@ pub(super) const KIND: &str = "rmmnet";
 /// that were learned.
 ///
 /// ## Recursion
-/// With a memory `c` (LSTM) and heads `f`, `h`, `e` in the frame of the object, which see neither position nor direction:
+/// In the form [`Aligned`], with a memory `c` (LSTM) and heads `f`, `h`, `e` that see neither position nor direction:
 /// ```text
-/// predict   c, and from it by f:   v⁻ = v + Δ_v,  p⁻ = p + T (v⁻ + Δ_p),   P⁻ = J P Jᵀ + Q,   axes and weight of the extent
-/// update    the points in the frame, each through two layers, then mean and maximum over them; with count, scatter and c by h:
-///           a centre z = z̄ + Δ with the covariance L Lᵀ, and the direction in which the object moves: a Kalman update with both
-///           axes by the rule of Feldmann, Fränken and Koch in the frame of the object
-/// extent    by e: direction between the course of the updated velocity and that of the scatter, axes, weight
+/// predict   c from the last estimate;  f(c):   v⁻ = v + Δ_v,   p⁻ = p + T (v⁻ + Δ_p),   P⁻ = J P Jᵀ + Q,   scaling of the axes
+/// update    each point in the frame of the object through two layers, then mean and maximum over them;
+///           h of these, of count, mean and scatter, and of c:   a centre z = z̄ + Δ_z with covariance L Lᵀ, and the direction
+///           in which the object moves: a Kalman update with both;   axes as a random matrix in the frame of the object
+/// extent    e: direction between the course of the updated velocity and the scatter, axes, weight
 /// ```
-/// `Δ_v` has a part that is said in the frame of the heading, weights of past velocities, and a share of what weights expect that
-/// are identified while the object is tracked ([`Identification`]). Scale and sensor noise of the [`Scattering`] are inside. A
-/// network that says nothing is a random-matrix filter in straight motion. A scan without points, or none, is a prediction.
+/// `Δ_v` has a part along and across the course, weights of past velocities, and a share of what weights expect that are identified
+/// while the object is tracked ([`Identification`]). Scale and sensor noise ([`Scattering`]) are inside, as what the network sees and
+/// in what it says nothing of. A network that says nothing is a random-matrix filter in straight motion; so is one that overflows. A
+/// scan without points changes nothing but the rate, and none is a prediction. Over no time there is no step.
+///
+/// The form [`Published`] is that of the paper.
+///
+/// Mixing ([`set_state`](Filter::set_state), [`set_extent`](Filter::set_extent)) leaves the memory; merging takes the mean of
+/// memories. The likelihood is that of the random matrix around what was predicted, so that hypotheses compare with those of
+/// [`RandomMatrix`].
 ///
 /// ## Use it when
 /// there is a model trained for such objects: their motion has a memory, they point where they go, or the points tell more than
-/// count, mean and scatter. [`Aligned`](tercel_core::extended::Aligned) is the filter to compare with, where the size is known.
+/// count, mean and scatter. Where the size is known, compare with [`tercel_core::extended::Aligned`].
 ///
 /// ## Reference
-/// RMMNet paper, section III. The form here is ours: frame, points, the update of the direction and the extent after the update are
-/// not in the paper, whose additive extent cannot follow an object that turns faster than its shape is averaged.
+/// RMMNet paper, section III (eqs. 9 to 36). The form [`Aligned`] is ours: the frame, the points, the update of the direction and the
+/// extent after the update are not in the paper, whose additive extent cannot follow an object that turns faster than its shape can be
+/// averaged.
+///
+/// ```
+/// use std::sync::Arc;
+/// use nalgebra::Matrix2;
+/// use tercel_core::{extended::{Points, Scattering}, filter::Filter};
+/// use tercel_neural::{filter::{RmmNet, RmmNetwork}, shipped};
+///
+/// // Vehicles, once a second; others come from `Model::open`.
+/// let network = Arc::new(RmmNetwork::from_model(&shipped::model("rmmnet-vehicle")?)?);
+/// let filter = RmmNet::new(network, Scattering::uniform(Matrix2::new(1.0, 0.0, 0.0, 0.64))?);
+/// let car = |x: f64| Points::from_iter([[x - 3.0, 0.9], [x + 4.0, 0.5], [x - 4.0, -0.9], [x + 3.0, -0.5]]);
+/// let mut belief = filter.birth(&car(0.0))?;
+/// for second in 1..=20 {
+///     filter.predict(&mut belief, 1.0);
+///     filter.update(&mut belief, &car(4.0 * second as f64))?;
+/// }
+/// assert!((filter.state(&belief).mean[2] - 4.0).abs() < 1.0);
+/// assert!(belief.axes()[0] > 2.0 * belief.axes()[1]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RmmNet {
     network: Arc<RmmNetwork>,

@@ -98,14 +98,15 @@ fn the_shipped_models_do_what_was_trained() {
     }
 }
 
-/// Aircraft that turn slowly, with a speed that is never quite the same, every four seconds.
+/// Aircraft that turn, so that they stay where single precision tells millimetres apart, with a speed that is never quite the
+/// same, every four seconds.
 fn flights(steps: usize) -> Tracks {
     let flight = |number: usize| {
         let mut place = nalgebra::Vector2::zeros();
         let state = |step: usize| {
             let (k, phase) = (step as f64, 0.7 * number as f64);
             let (course, speed) =
-                (0.02 * k + (0.05 * k + phase).sin(), 100.0 + 12.0 * (2.1 * k + phase).sin());
+                (0.08 * k + (0.05 * k + phase).sin(), 100.0 + 12.0 * (2.1 * k + phase).sin());
             let velocity = nalgebra::Vector2::new(course.cos(), course.sin()) * speed;
             place += velocity * 4.0;
             Vector4::new(place.x, place.y, velocity.x, velocity.y)
