@@ -39,8 +39,10 @@ const FILES: &[(&str, &[u8])] = files![
     "mnemonic",
     "neural-imm",
     "rmmnet-aircraft",
+    "rmmnet-aircraft-paper",
     "rmmnet-crossing",
     "rmmnet-vehicle",
+    "rmmnet-vehicle-paper",
     "tr-mtt",
 ];
 

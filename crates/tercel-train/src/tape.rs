@@ -193,3 +193,76 @@ impl Number for Variable<'_> {
         self.of_two(x, self.value.atan2(x.value), [x.value / square, -self.value / square])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slope(of: impl Fn(Variable<'_>, Variable<'_>) -> f64, at: [f64; 2], place: usize) -> f64 {
+        let moved = |by: f64| {
+            let mut at = at;
+            at[place] += by;
+            of(Variable::of(at[0]), Variable::of(at[1]))
+        };
+        (moved(1e-5) - moved(-1e-5)) / 2e-5
+    }
+
+    macro_rules! checked {
+        ($name:literal, $at:expr, $of:expr) => {{
+            fn computed<'t>(x: Variable<'t>, y: Variable<'t>) -> Variable<'t> {
+                let of: fn(Variable<'t>, Variable<'t>) -> Variable<'t> = $of;
+                of(x, y)
+            }
+            let (tape, at) = (Tape::default(), $at);
+            let (x, y) = (tape.variable(at[0]), tape.variable(at[1]));
+            let mut slopes = Vec::new();
+            tape.slopes(&[(computed(x, y), 1.0)], &mut slopes);
+            for (place, variable) in [x, y].into_iter().enumerate() {
+                let expected = slope(|x, y| computed(x, y).value(), at, place);
+                let found = slopes[variable.place()];
+                assert!((found - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{}: {found}", $name);
+            }
+        }};
+    }
+
+    #[test]
+    fn derivatives_of_every_operation_equal_differences() {
+        checked!("sum", [0.7, -1.3], |x, y| x + y * 2.0 + 3.0);
+        checked!("difference", [0.7, -1.3], |x, y| x - -y);
+        checked!("product", [0.7, -1.3], |x, y| x * y * x);
+        checked!("quotient", [0.7, -1.3], |x, y| x / (y * y));
+        checked!("root", [0.7, 1.3], |x, y| (x * y).sqrt());
+        checked!("exponential", [0.7, -1.3], |x, y| (x * y).exp());
+        checked!("logarithm", [0.7, 1.3], |x, y| (x + y * y).ln());
+        checked!("hyperbolic tangent", [0.7, -1.3], |x, y| (x - y).tanh());
+        checked!("sine and cosine", [0.7, -1.3], |x, y| x.sin() * y.cos());
+        checked!("angle", [0.7, -1.3], |x, y| x.atan2(y));
+        checked!("gamma", [0.7, 12.3], |x, y| x.ln_gamma() + y.ln_gamma());
+    }
+
+    #[test]
+    fn the_logarithm_of_the_gamma_function_is_that_of_factorials() {
+        let mut product = 0.0_f64;
+        for n in 1..40 {
+            let found = Variable::of(f64::from(n)).ln_gamma().value();
+            assert!((found - product).abs() < 1e-9 * (1.0 + product), "{n}: {found}");
+            product += f64::from(n).ln();
+        }
+        let half = Variable::of(0.5).ln_gamma().value();
+        assert!((half - 0.5 * std::f64::consts::PI.ln()).abs() < 1e-9, "{half}");
+    }
+
+    #[test]
+    fn constants_leave_no_trace() {
+        let mut tape = Tape::default();
+        let x = tape.variable(2.0);
+        let constant = Variable::of(3.0) * Variable::of(4.0) + Variable::of(1.0);
+        let product = constant * x;
+        let mut slopes = Vec::new();
+        tape.slopes(&[(product, 2.0), (constant, 5.0)], &mut slopes);
+        assert_eq!((slopes.len(), slopes[x.place()]), (2, 26.0));
+        tape.clear();
+        tape.slopes(&[], &mut slopes);
+        assert!(slopes.is_empty());
+    }
+}

@@ -5,11 +5,11 @@ use tercel_core::filter::Filter;
 use tercel_neural::filter::rmm_net::{Kinematics, Symmetric, Track, View};
 use tercel_neural::filter::{RmmNet, RmmNetBelief, RmmNetwork};
 
-use super::operations::{Given, Step};
+use super::operations::{Given, Pool, Step};
 use super::rows::{TRACK, numbers};
 use super::*;
 use crate::Initial;
-use crate::backend::values;
+use crate::backend::{constant, values};
 use crate::task::repository;
 
 const RECIPE: &str = "
@@ -304,4 +304,58 @@ fn a_recipe_that_needs_tracks_says_how_they_are_named() {
     let text = format!("{}{tracks}{}", &RECIPE[..start], &RECIPE[end..]);
     let error = RmmNetTask::new(&Recipe::<RmmNetKind>::parse(&text).unwrap(), None).unwrap_err();
     assert!(error.to_string().contains("--data"), "{error}");
+}
+
+#[test]
+fn points_are_pooled_by_mean_and_maximum_whatever_their_order_and_however_many() {
+    let rows = [3.0, -1.0, 1.0, 2.0, -2.0, 0.5];
+    let pool = Pool { counts: Arc::new(vec![2, 0, 1]) };
+    let pooled = values(&apply(pool.clone(), [constant(rows.to_vec(), [3, 2])]));
+    assert_eq!(pooled, [2.0, 0.5, 3.0, 2.0, 0.0, 0.0, 0.0, 0.0, -2.0, 0.5, -2.0, 0.5]);
+    let mut set = ParameterSet::new(1);
+    set.add("rows", &[3, 2], Initial::Values(rows.to_vec())).unwrap();
+    let factors = constant((0..12).map(|i| (i as f32).cos()).collect(), [3, 4]);
+    let value = |weights: &Weights| {
+        (apply(pool.clone(), [weights.tensors()[0].clone()]) * factors.clone()).sum().reshape([1, 1])
+    };
+    let trainable = Weights::trainable(&set);
+    let found = trainable.gradients(&value(&trainable));
+    for (index, gradient) in found[0].iter().enumerate() {
+        let moved = |by: f32| {
+            let mut set = set.clone();
+            set.values_mut().next().unwrap().1[index] += by;
+            f64::from(values(&value(&Weights::frozen(&set)))[0])
+        };
+        let slope = (moved(1e-2) - moved(-1e-2)) / 2e-2;
+        assert!((slope - f64::from(*gradient)).abs() < 1e-3, "{index}: {gradient} for {slope}");
+    }
+}
+
+#[test]
+fn the_score_of_an_extent_sets_its_weight_alone() {
+    let (mut task, _) = task(RECIPE);
+    let rides = task.batch(draw(&[1])).unwrap();
+    (task.costs.surprise, task.costs.error, task.costs.shape, task.costs.foresight) = (0.0, 0.0, 0.0, 0.0);
+    task.costs.score = 1.0;
+    let motion = rides.births[0].0;
+    let mut row: Vec<f32> = motion.numbers().map(|x| x as f32).to_vec();
+    row.extend([1.7, 0.3, 9.0, 0.4, 3.0, 0.4, 2.0, 1.7, 0.3]);
+    let width = row.len();
+    let mut set = ParameterSet::new(1);
+    set.add("row", &[1, width], Initial::Values(row)).unwrap();
+    let truth = Arc::new(vec![rides.truth[0][0]]);
+    let judge = Judge { costs: task.costs, layout: task.layout(), truth };
+    let value = |weights: &Weights| apply(judge.clone(), [weights.tensors()[0].clone()]);
+    let trainable = Weights::trainable(&set);
+    let found = trainable.gradients(&value(&trainable));
+    for (index, gradient) in found[0].iter().enumerate() {
+        let moved = |by: f32| {
+            let mut set = set.clone();
+            set.values_mut().next().unwrap().1[index] += by;
+            f64::from(values(&value(&Weights::frozen(&set)))[0])
+        };
+        let slope = if index == TRACK + 1 { (moved(1e-2) - moved(-1e-2)) / 2e-2 } else { 0.0 };
+        assert!((slope - f64::from(*gradient)).abs() < 5e-3 * (1.0 + slope.abs()), "{index}: {gradient}");
+    }
+    assert!(found[0][TRACK + 1].abs() > 0.1);
 }
