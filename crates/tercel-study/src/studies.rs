@@ -122,7 +122,7 @@ fn boxed<E: Experiment + 'static>(
 }
 
 /// All studies.
-pub const STUDIES: [Study; 13] = [
+pub const STUDIES: [Study; 12] = [
     Study {
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
@@ -181,14 +181,6 @@ pub const STUDIES: [Study; 13] = [
             ],
             ..MonteCarlo::new(extended::SEED, 40, |r| boxed(ExtendedExperiment::vehicle(r)))
         }),
-    },
-    Study {
-        name: "vehicle-ablation",
-        about: "what the blocks of RMMNet are worth, on the vehicles of the study vehicle (Table III)",
-        methods: &extended::methods::ABLATION,
-        kind: Kind::MonteCarlo(MonteCarlo::new(extended::SEED, 40, |r| {
-            boxed(ExtendedExperiment::ablation(r))
-        })),
     },
     Study {
         name: "aircraft",
@@ -437,7 +429,6 @@ mod tests {
             "atc-missing",
             "atc-ablation",
             "vehicle",
-            "vehicle-ablation",
             "extended-scene",
             "clutter-all",
             "clutter-random",

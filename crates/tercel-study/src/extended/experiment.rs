@@ -82,13 +82,6 @@ impl ExtendedExperiment {
         Self::new("vehicle", Scene::Vehicle(vehicle), &settings, options, drawn, request.methods)
     }
 
-    /// The study `vehicle-ablation`: what the blocks of RMMNet are worth.
-    pub(crate) fn ablation(request: &Request<'_>) -> Result<Self, StudyError> {
-        let scene = Scene::Vehicle(Vehicle::new(Generator::Reject));
-        let drawn = (request.seed, request.runs);
-        Self::new("vehicle-ablation", scene, &Settings::REJECT, BTreeMap::new(), drawn, request.methods)
-    }
-
     /// The study `aircraft`.
     pub(crate) fn aircraft(request: &Request<'_>) -> Result<Self, StudyError> {
         let heading = match request.set {

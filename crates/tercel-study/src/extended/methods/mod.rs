@@ -56,10 +56,6 @@ pub const VEHICLE_METHODS: [&str; 20] = [
 /// Names of all methods of the study `aircraft`: nobody knows the true motion there.
 pub const AIRCRAFT_METHODS: &[&str] = VEHICLE_METHODS.split_at(19).0;
 
-/// Names of all methods of the study `vehicle-ablation`: RMMNet as published, small, and without some of its blocks.
-pub const ABLATION: [&str; 6] =
-    ["full", "without-prediction", "without-update", "without-memory", "only-update", "only-prediction"];
-
 /// The method of that name, with these numbers.
 ///
 /// # Errors
@@ -86,17 +82,13 @@ pub(crate) fn method(
         "mem-rbpf" => Box::new(shape::Sampled { settings, paper: false }),
         "mem-rbpf-paper" => Box::new(shape::Sampled { settings, paper: true }),
         "rmmnet-paper" => Box::new(learned::Remembering::new(settings.rmmnet_paper)?),
-        name if ABLATION.contains(&name) => {
-            Box::new(learned::Remembering::new(&format!("rmmnet-ablation-{name}"))?)
-        }
         "rmmnet" => Box::new(learned::Remembering::new(settings.rmmnet)?),
         "known-size" => Box::new(known::Sized(settings)),
         "aligned" => Box::new(known::Straight(settings)),
         "aligned-ar" => Box::new(known::Regressive(settings)),
         "oracle" => Box::new(known::Oracle),
         _ => {
-            let known =
-                if study == "vehicle-ablation" { ABLATION.join(", ") } else { VEHICLE_METHODS.join(", ") };
+            let known = VEHICLE_METHODS.join(", ");
             return Err(StudyError::UnknownMethod { study, name: name.to_owned(), known });
         }
     })
