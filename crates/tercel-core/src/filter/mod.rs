@@ -11,6 +11,7 @@
 //! | [`Padded`] | Gaussian | a model with a smaller state beside one with a larger |
 
 mod correction;
+mod either;
 mod estimate;
 mod extended;
 mod gaussian;
@@ -34,6 +35,7 @@ use crate::error::FilterError;
 use crate::extended::InverseWishart;
 
 pub(crate) use correction::{Comparison, predicted};
+pub use either::Either;
 pub use estimate::Estimate;
 pub use extended::Extended;
 pub use imm::{Imm, ImmBelief};
