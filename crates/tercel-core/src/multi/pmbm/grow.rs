@@ -8,6 +8,10 @@ use crate::association::{KBest, Ranked};
 use crate::filter::Filter;
 use crate::multi::Scan;
 
+/// Hypotheses of a cluster, times its measurements, times its pairs: what following them all may cost. A crowd beyond, hundreds of
+/// measurements in one place, is no picture of objects and is followed by fewer hypotheses.
+const WORK: usize = 20_000_000;
+
 /// A cluster and what it may do with the measurements in its gates.
 pub(super) struct Growth<'a, B> {
     cluster: Cluster<B>,
@@ -89,6 +93,8 @@ impl<'a, B: Clone> Growth<'a, B> {
     /// The heaviest hypotheses after the scan, relative to the heaviest.
     fn children(&self, k_best: &mut KBest, cap: usize, prune: f64) -> Vec<Child> {
         let misses = vec![0.0; self.measurements.len()];
+        let each = self.measurements.len() * self.candidates.len();
+        let cap = cap.min(WORK / each.max(1)).max(1);
         let mut children = Vec::new();
         let mut pairs = Vec::new();
         for (parent, hypothesis) in self.cluster.hypotheses.iter().enumerate() {
