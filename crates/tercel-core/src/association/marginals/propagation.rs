@@ -12,7 +12,7 @@ const CONVERGED: f64 = 1e-6;
 const SURROUNDINGS: usize = 8192;
 
 /// Rows that compete with those of the surroundings by less, as the chance that both take one column, stay outside.
-const LEAST_PULL: f64 = 1e-3;
+const LEAST_PULL: f64 = 1e-5;
 
 /// Pairs of rows that want the same column, up to which the surroundings are looked at. A crowd beyond is no picture of
 /// objects, and would take long.

@@ -93,8 +93,7 @@ impl<'a, B: Clone> Growth<'a, B> {
     /// The heaviest hypotheses after the scan, relative to the heaviest.
     fn children(&self, k_best: &mut KBest, cap: usize, prune: f64) -> Vec<Child> {
         let misses = vec![0.0; self.measurements.len()];
-        let each = self.measurements.len() * self.candidates.len();
-        let cap = cap.min(WORK / each.max(1)).max(1);
+        let mut affordable = WORK / (self.measurements.len() * self.candidates.len()).max(1);
         let mut children = Vec::new();
         let mut pairs = Vec::new();
         for (parent, hypothesis) in self.cluster.hypotheses.iter().enumerate() {
@@ -107,12 +106,13 @@ impl<'a, B: Clone> Growth<'a, B> {
             pairs.clear();
             let own = self.candidates.iter().filter(|c| hypothesis.leaves[c.tree] == Some(c.leaf));
             pairs.extend(own.map(|c| (self.row(c.measurement), c.tree, -c.ln_ratio)));
-            let wanted = (hypothesis.weight * cap as f64).ceil().max(1.0) as usize;
+            let wanted = ((hypothesis.weight * cap as f64).ceil() as usize).min(affordable).max(1);
             // All costs are finite and every measurement may stay alone, so there is always an answer.
             let Ok(found) = k_best.solve(&pairs, self.cluster.trees.len(), &misses, wanted, -prune.ln())
             else {
                 continue;
             };
+            affordable = affordable.saturating_sub(found.len());
             children.extend(found.iter().map(|Ranked { cost, columns }| Child {
                 ln_weight: ln_parent - cost,
                 parent,
