@@ -129,7 +129,7 @@ fn coincidences() -> Vec<Scene> {
         (0..3).map(|_| of.see(place)).collect()
     });
     let exactly = every_second(25, |time| vec![boats(time)[0].into(); 4]);
-    let crowd = every_second(4, |_| vec![[500.0, 500.0].into(); 200]);
+    let crowd = every_second(3, |_| vec![[500.0, 500.0].into(); 100]);
     let far = every_second(10, |time| {
         let [boat, _] = boats(time);
         vec![boat.into(), [1e12, -1e12].into(), [-1e300, 1e300].into(), [1e-300, 0.0].into()]
@@ -137,7 +137,7 @@ fn coincidences() -> Vec<Scene> {
     vec![
         scene("three objects in one place", 1..=4, radar(0.95, 1.0), together),
         scene("each measurement four times", 1..=4, radar(0.95, 1.0), exactly),
-        scene("two hundred measurements in one place", 0..=200, radar(0.95, 1.0), crowd),
+        scene("a hundred measurements in one place", 0..=100, radar(0.95, 1.0), crowd),
         scene("measurements at the ends of the world", 1..=4, radar(0.95, 1.0), far),
     ]
 }
