@@ -8,12 +8,13 @@ mod untrained;
 use std::sync::Arc;
 
 use divan::{Bencher, black_box};
+use tercel_core::extended::{Points, Scattering};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Measurement, Position, RangeBearing};
 use tercel_neural::filter::{
     Architecture, Attention, BankNetwork, Covariance, Derivative, EnsKNets, EnsKNetsHyper, KalmanNet,
-    KalmanNetHyper, LiquidHyper, LiquidKalman, NeuralImm, Normalisation, Sign,
+    KalmanNetHyper, LiquidHyper, LiquidKalman, NeuralImm, Normalisation, RmmNet, RmmNetwork, Sign,
 };
 use tercel_neural::layer::CellShape;
 use tercel_neural::shipped;
@@ -111,5 +112,22 @@ fn liquid_predictions_of_500(bencher: Bencher, cell: &str) {
     bencher.bench_local(|| {
         let mut all: Vec<_> = beliefs.iter_mut().collect();
         filter.predict_all(black_box(&mut all), 1.0);
+    });
+}
+
+/// Scans of twenty points, with the model that comes with Tercel.
+#[divan::bench]
+fn rmm_net(bencher: Bencher) {
+    let network = RmmNetwork::from_model(&shipped::model("rmmnet-vehicle").unwrap()).unwrap();
+    let noise = nalgebra::Matrix2::new(1.0, 0.0, 0.0, 0.64);
+    let filter = RmmNet::new(Arc::new(network), Scattering::uniform(noise).unwrap());
+    let seen: Points =
+        (0..20).map(|i| [100.0 + f64::from(i % 5) * 2.5, 50.0 + f64::from(i % 7) * 0.3]).collect();
+    let mut belief = filter.birth(&seen).unwrap();
+    bencher.counter(divan::counter::ItemsCount::new(STEPS)).bench_local(|| {
+        for _ in 0..STEPS {
+            filter.predict(black_box(&mut belief), black_box(1.0));
+            black_box(filter.update(&mut belief, black_box(&seen))).unwrap();
+        }
     });
 }

@@ -46,6 +46,8 @@ const FILES: &[(&str, &[u8])] = files![
     "mnemonic",
     "neural-imm",
     "neural-imm-position",
+    "rmmnet-aircraft",
+    "rmmnet-vehicle",
     "tr-mtt",
 ];
 

@@ -5,12 +5,13 @@
 mod untrained;
 
 use allocation_counter::measure;
+use tercel_core::extended::{Points, Scattering};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
 use tercel_neural::filter::{
     Architecture, Covariance, DeepMtt, DeepMttHyper, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
-    LiquidKalman, MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, TrMtt, TrMttHyper,
+    LiquidKalman, MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, RmmNet, TrMtt, TrMttHyper,
 };
 use untrained::{TINY_ONE, network, tiny};
 
@@ -103,4 +104,25 @@ fn liquid_filters_do_not_allocate() {
     for hyper in hypers {
         assert_eq!(allocations(&LiquidKalman::new(untrained::liquid(&hyper, 1.0), radar)), 0, "{hyper:?}");
     }
+}
+
+#[test]
+fn rmm_nets_do_not_allocate_with_twenty_points_one_or_none() {
+    let points = Scattering::uniform(nalgebra::Matrix2::identity()).unwrap();
+    let filter = RmmNet::new(untrained::rmm_net(&untrained::small_rmm_net(), 0.5), points);
+    let seen: Points = (0..20).map(|i| [100.0 + f64::from(i % 5), 50.0 + f64::from(i % 7)]).collect();
+    let scans = [seen, Points::from_iter([[101.0, 51.0]]), Points::default()];
+    let mut belief = filter.birth(&scans[1]).unwrap();
+    let mut step = || {
+        for scan in &scans {
+            filter.predict(&mut belief, 1.0);
+            filter.update(&mut belief, scan).unwrap();
+            filter.reach(&belief);
+        }
+        filter.state(&belief)
+    };
+    (0..10).for_each(|_| {
+        step();
+    });
+    assert_eq!(measure(|| (0..100).for_each(|_| assert!(step().mean[0].is_finite()))).count_total, 0);
 }

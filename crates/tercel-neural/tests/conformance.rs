@@ -1,5 +1,8 @@
 //! Learned filters keep the promises of every filter.
 
+#[path = "../../tercel-core/tests/conformance/extended.rs"]
+#[allow(dead_code, clippy::unwrap_used)]
+mod extended;
 mod untrained;
 
 use tercel_core::conformance;
@@ -9,7 +12,7 @@ use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
 use tercel_neural::filter::{
     Architecture, Covariance, DeepMtt, Derivative, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
-    LiquidHyper, LiquidKalman, MnemonicKalman, NeuralImm, Normalisation, TrMtt,
+    LiquidHyper, LiquidKalman, MnemonicKalman, NeuralImm, Normalisation, RmmNet, TrMtt,
 };
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
@@ -140,4 +143,15 @@ conformance!(
         let filters = [0, 5].map(|cell| liquid(&untrained::small_liquid(untrained::CELLS[cell]), p));
         Imm::new(filters, Transition::sticky(0.95)).unwrap()
     })
+);
+
+fn rmm_net(problem: &Problem) -> RmmNet {
+    let scattering = tercel_core::extended::Scattering::uniform(problem.noise() * 0.5).unwrap();
+    RmmNet::new(untrained::rmm_net(&untrained::small_rmm_net(), 0.3), scattering)
+}
+
+conformance!(rmm_net_on_single_points, extended::own::<4, _, _>(rmm_net));
+conformance!(
+    imm_of_rmm_nets,
+    extended::own::<4, _, _>(|p| Imm::new([rmm_net(p), rmm_net(p)], Transition::sticky(0.95)).unwrap())
 );

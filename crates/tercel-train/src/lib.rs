@@ -108,6 +108,7 @@ pub mod optimiser;
 mod parameters;
 pub mod recipe;
 mod store;
+mod tape;
 pub mod task;
 pub mod trainer;
 

@@ -21,6 +21,7 @@ mod liquid;
 mod memory;
 mod mnemonic;
 mod neural_imm;
+pub mod rmm_net;
 mod sight;
 mod tr_mtt;
 
@@ -39,6 +40,7 @@ pub use liquid::{
 pub use memory::Memory;
 pub use mnemonic::{MnemonicBelief, MnemonicHyper, MnemonicKalman, MnemonicNetwork};
 pub use neural_imm::{BankNetwork, NeuralImm, NeuralImmBelief, NeuralImmHyper, Outlook};
+pub use rmm_net::{RmmNet, RmmNetBelief, RmmNetHyper, RmmNetwork};
 pub use sight::Sight;
 pub use tr_mtt::{Frame, TrMtt, TrMttBelief, TrMttHyper, TransformerNetwork};
 
@@ -51,8 +53,8 @@ use crate::model::Model;
 const LABELS: [&str; 4] = ["x", "y", "vx", "vy"];
 
 /// The kinds of models that there are filters for.
-pub const KINDS: [&str; 7] =
-    ["deep-mtt", "ens-knets", "kalman-net", "liquid", "mnemonic", "neural-imm", "tr-mtt"];
+pub const KINDS: [&str; 8] =
+    ["deep-mtt", "ens-knets", "kalman-net", "liquid", "mnemonic", "neural-imm", "rmmnet", "tr-mtt"];
 
 /// Accepts a model of which a filter can be made.
 ///
@@ -66,6 +68,7 @@ pub fn check(model: &Model) -> Result<(), ModelError> {
         "liquid" => LiquidNetwork::from_model(model).map(drop),
         "mnemonic" => MnemonicNetwork::from_model(model).map(drop),
         "neural-imm" => BankNetwork::from_model(model).map(drop),
+        "rmmnet" => RmmNetwork::from_model(model).map(drop),
         "tr-mtt" => TransformerNetwork::from_model(model).map(drop),
         other => Err(ModelError::Kind {
             file: model.file().clone(),

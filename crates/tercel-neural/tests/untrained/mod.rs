@@ -10,11 +10,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tercel_core::motion::{Motion, Turn};
 use tercel_core::sensor::{ConvertedPolar, Measurement};
+use tercel_neural::filter::rmm_net::{self, Aligned, Identification};
 use tercel_neural::filter::{
     Architecture, Attention, BankNetwork, BranchHyper, Covariance, DeepMttHyper, EnsKNetsHyper,
     EnsembleNetwork, Feature, Form, GainNetwork, KalmanNetHyper, LiquidHyper, LiquidNetwork, MnemonicHyper,
-    MnemonicNetwork, NeuralImmHyper, Normalisation, Residual, ResidualNetwork, Sign, TrMttHyper,
-    TransformerNetwork,
+    MnemonicNetwork, NeuralImmHyper, Normalisation, Residual, ResidualNetwork, RmmNetHyper, RmmNetwork, Sign,
+    TrMttHyper, TransformerNetwork,
 };
 use tercel_neural::layer::{CellShape, Solver};
 use tercel_neural::{Card, Model, Tensor};
@@ -212,4 +213,17 @@ pub fn paper_liquid() -> LiquidHyper {
         speed: 20.0,
         ..LiquidHyper::paper(limits.map(|limit| -limit), limits, 1e-2, [10.0, 10.0, 5.0, 5.0])
     }
+}
+
+/// An RMMNet with random weights.
+pub fn rmm_net(hyper: &RmmNetHyper, size: f32) -> Arc<RmmNetwork> {
+    let model = model("rmmnet", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(RmmNetwork::from_model(&model).unwrap())
+}
+
+/// A small one for vehicles.
+pub fn small_rmm_net() -> RmmNetHyper {
+    let identification = Identification { order: 3, ..Identification::default() };
+    let form = Aligned { hidden: 7, encoder: 6, speed: 20.0, identification, ..Aligned::default() };
+    RmmNetHyper { interval: 1.0, memory: 8, form: rmm_net::Form::Aligned(form) }
 }

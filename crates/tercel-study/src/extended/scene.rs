@@ -101,6 +101,19 @@ impl Aircraft {
         Ok(Aircraft { tracks, interval, heading })
     }
 
+    /// The tracks for tuning and training, of which none is in the test.
+    ///
+    /// # Errors
+    /// As [`read`](Aircraft::read).
+    pub fn training(path: &Path) -> Result<Self, StudyError> {
+        Aircraft::read(path, Heading::Course, false)
+    }
+
+    /// The states `x, y, vx, vy` of each track, in m and m/s.
+    pub fn tracks(&self) -> &[Vec<Vector4<f64>>] {
+        &self.tracks
+    }
+
     /// Number of tracks.
     pub fn count(&self) -> usize {
         self.tracks.len()

@@ -41,6 +41,8 @@ pub(crate) struct Settings {
     pub residual: f64,
     /// Variance of its weights at first.
     pub weights: f64,
+    /// The model of the learned filter.
+    pub rmmnet: &'static str,
     /// What the publication says.
     pub paper: PaperSettings,
 }
@@ -143,6 +145,7 @@ impl Settings {
         jump_aligned: 5.0,
         residual: 1.15,
         weights: 0.25,
+        rmmnet: "rmmnet-vehicle",
         paper: VEHICLE_PAPER,
     };
 
@@ -194,6 +197,7 @@ impl Settings {
         jump_aligned: 15.0,
         residual: 8.5,
         weights: 0.05,
+        rmmnet: "rmmnet-aircraft",
         paper: AIRCRAFT_PAPER,
     };
 

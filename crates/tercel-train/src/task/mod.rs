@@ -12,6 +12,7 @@ pub mod plots;
 #[cfg(test)]
 mod repository;
 pub mod residual;
+pub mod rmm_net;
 pub mod tr_mtt;
 
 use std::ops::ControlFlow;
@@ -22,13 +23,14 @@ use crate::recipe;
 use crate::trainer::{Progress, Run, Summary};
 
 /// The kinds of recipes.
-pub const KINDS: [&str; 7] = [
+pub const KINDS: [&str; 8] = [
     <deep_mtt::DeepMttKind as recipe::Kind>::NAME,
     <ens_knets::EnsKNetsKind as recipe::Kind>::NAME,
     <kalman_net::KalmanNetKind as recipe::Kind>::NAME,
     <liquid::LiquidKind as recipe::Kind>::NAME,
     <mnemonic::MnemonicKind as recipe::Kind>::NAME,
     <neural_imm::NeuralImmKind as recipe::Kind>::NAME,
+    <rmm_net::RmmNetKind as recipe::Kind>::NAME,
     <tr_mtt::TrMttKind as recipe::Kind>::NAME,
 ];
 
@@ -49,6 +51,7 @@ pub fn train(
         "liquid" => liquid::train(recipe, run, observer),
         "mnemonic" => mnemonic::train(recipe, run, observer),
         "neural-imm" => neural_imm::train(recipe, run, observer),
+        "rmmnet" => rmm_net::train(recipe, run, observer),
         "tr-mtt" => tr_mtt::train(recipe, run, observer),
         other => {
             Err(refused("kind", format!("{other:?}"), format!("there are the kinds {}", KINDS.join(", "))))

@@ -9,8 +9,10 @@ mod tests;
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
+use nalgebra::Vector4;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -61,7 +63,12 @@ pub struct Run {
     pub threads: usize,
     /// What the card says of the circumstances.
     pub stamp: Stamp,
+    /// Recorded tracks, for recipes that learn from them.
+    pub tracks: Option<Tracks>,
 }
+
+/// Tracks to learn from: states `x, y, vx, vy` at equal steps of time, in m and m/s.
+pub type Tracks = Arc<Vec<Vec<Vector4<f64>>>>;
 
 /// Entries of the model card that only the caller knows. Empty ones stay empty.
 #[derive(Debug, Clone, Default)]
@@ -78,7 +85,7 @@ impl Run {
     /// A fresh training on all cores.
     pub fn new(model: impl Into<PathBuf>) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { model: model.into(), resume: false, threads, stamp: Stamp::default() }
+        Self { model: model.into(), resume: false, threads, stamp: Stamp::default(), tracks: None }
     }
 
     /// The checkpoint: all that is needed to go on.

@@ -40,6 +40,10 @@ pub struct TrainArguments {
     /// Threads to use; without it, one for each core. The result does not depend on them.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    /// Recorded tracks, for recipes that learn from them: a NumPy array, or a folder with one. The last fifth, on which the
+    /// study aircraft tests, is left out.
+    #[arg(long, value_name = "PATH")]
+    data: Option<PathBuf>,
     /// Licence of the weights, for the model card: MIT, CC-BY-4.0, ...
     #[arg(long, value_name = "NAME", default_value = "")]
     licence: String,
@@ -49,7 +53,8 @@ const AFTER: &str = "\
 Examples:
   tercel train recipes/kalman-net-straight.toml
   tercel train recipes/kalman-net-straight.toml --resume
-  tercel train my-recipe.toml -o my-models/turns.safetensors --threads 4";
+  tercel train my-recipe.toml -o my-models/turns.safetensors --threads 4
+  tercel train recipes/rmmnet-aircraft.toml --data tracks.npy";
 
 impl TrainArguments {
     /// Trains.

@@ -4,8 +4,9 @@ use std::io::ErrorKind;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use tercel_study::extended::Aircraft;
 use tercel_train::recipe::Outline;
-use tercel_train::trainer::{End, Run, Stamp, Summary};
+use tercel_train::trainer::{End, Run, Stamp, Summary, Tracks};
 use tercel_train::{TrainError, task};
 
 use super::TrainArguments;
@@ -23,7 +24,8 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
     let outline = Outline::parse(&text).map_err(|error| failure(&name, error))?;
     let run =
         Run { resume: arguments.resume, stamp: stamp(arguments), ..Run::new(target(arguments, &outline)?) };
-    let run = Run { threads: arguments.threads.map_or(run.threads, usize::from), ..run };
+    let threads = arguments.threads.map_or(run.threads, usize::from);
+    let run = Run { threads, tracks: tracks(arguments)?, ..run };
     keep_what_is_there(arguments, &run)?;
     let mut observer = Observer::new(console, outline.schedule.epochs);
     let trained = task::train(&text, &run, &mut |progress| {
@@ -33,6 +35,14 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
     drop(observer);
     let summary = trained.map_err(|error| failure(&name, error))?;
     output::print(&result(&outline, &run, &summary))
+}
+
+/// The tracks to learn from: none of those on which the study tests.
+fn tracks(arguments: &TrainArguments) -> Result<Option<Tracks>, Failure> {
+    let Some(path) = &arguments.data else { return Ok(None) };
+    let failed = |error| Failure::Input(Report::of(&error));
+    let aircraft = Aircraft::training(path).map_err(failed)?;
+    Ok(Some(Tracks::new(aircraft.tracks().to_vec())))
 }
 
 /// Where the model goes. Only the folder that nobody named is made.

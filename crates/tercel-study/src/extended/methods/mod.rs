@@ -10,6 +10,7 @@
 //! | `imm-rmm`, `imm-rmm-paper` | | the same in four interacting modes: straight, accelerating, turning left and right |
 //! | `mem-ekf`, `mem-ekf-paper` | | multiplicative error, linearised (Yang and Baum) |
 //! | `mem-rbpf`, `mem-rbpf-paper` | | multiplicative error with particles of the angle (Steuernagel and Baum) |
+//! | `rmmnet` | | random matrix with a learned memory, which also sees the points themselves |
 //! | `known-size` | the size | the angle of the scan's greatest likelihood; for aircraft that of the course |
 //! | `aligned` | the size | the angle of velocity and scan together |
 //! | `aligned-ar` | the size | the same with an auto-regressive motion of order 10 that is identified on line |
@@ -19,6 +20,7 @@
 //! other recordings with scatter scale and sensor noise inside.
 
 mod known;
+mod learned;
 mod matrix;
 mod shape;
 
@@ -27,7 +29,7 @@ use super::{Method, Recording, StepEstimate};
 use crate::error::StudyError;
 
 /// Names of all methods of the study `vehicle`, in the order in which they are best read.
-pub const VEHICLE_METHODS: [&str; 18] = [
+pub const VEHICLE_METHODS: [&str; 19] = [
     "centroid",
     "b-rmm-paper",
     "vb-rmm-paper",
@@ -42,6 +44,7 @@ pub const VEHICLE_METHODS: [&str; 18] = [
     "imm-rmm",
     "mem-ekf",
     "mem-rbpf",
+    "rmmnet",
     "known-size",
     "aligned",
     "aligned-ar",
@@ -49,7 +52,7 @@ pub const VEHICLE_METHODS: [&str; 18] = [
 ];
 
 /// Names of all methods of the study `aircraft`: nobody knows the true motion there.
-pub const AIRCRAFT_METHODS: &[&str] = VEHICLE_METHODS.split_at(17).0;
+pub const AIRCRAFT_METHODS: &[&str] = VEHICLE_METHODS.split_at(18).0;
 
 /// The method of that name, with these numbers.
 ///
@@ -76,6 +79,7 @@ pub(crate) fn method(
         "mem-ekf-paper" => Box::new(shape::Linearised { settings, paper: true }),
         "mem-rbpf" => Box::new(shape::Sampled { settings, paper: false }),
         "mem-rbpf-paper" => Box::new(shape::Sampled { settings, paper: true }),
+        "rmmnet" => Box::new(learned::Remembering::new(settings.rmmnet)?),
         "known-size" => Box::new(known::Sized(settings)),
         "aligned" => Box::new(known::Straight(settings)),
         "aligned-ar" => Box::new(known::Regressive(settings)),

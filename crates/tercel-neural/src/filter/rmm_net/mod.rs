@@ -1,0 +1,221 @@
+//! RMMNet: a random-matrix filter with a learned memory.
+
+mod belief;
+mod features;
+mod hyper;
+mod kinematics;
+mod layers;
+mod network;
+mod number;
+mod published;
+mod regression;
+mod steps;
+mod track;
+mod view;
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix2, Vector2};
+use tercel_core::belief::Gaussian;
+use tercel_core::error::FilterError;
+use tercel_core::extended::{
+    Evolution, Freedom, GaussianInverseWishart, InverseWishart, Points, RandomMatrix, Rule, Scattering,
+};
+use tercel_core::filter::{Estimate, Filter, Innovation};
+use tercel_core::motion::ConstantVelocity;
+
+use super::memory::Memory;
+use belief::gaussian;
+use network::Layers;
+
+pub use belief::RmmNetBelief;
+pub use features::{Before, heading};
+pub use hyper::{Aligned, Form, RmmNetHyper, Sizes};
+pub use kinematics::{Kinematics, begin};
+pub use network::RmmNetwork;
+pub use number::{Number, Symmetric};
+pub use published::{Blocks, Extended, Moments, Published, Transition};
+/// Widths of what the form of the publication sees and says.
+pub mod widths {
+    pub use super::published::{ESTIMATE_SEEN, PREDICTED, PREDICTIONS, SAID, SCAN_SEEN};
+}
+pub use regression::{Identification, Regression};
+pub use track::{Length, Past, Report, Track};
+pub use view::View;
+
+/// The kind of these models in their cards.
+pub(super) const KIND: &str = "rmmnet";
+
+/// Estimates motion and extent of an object that gives many points a scan, with a motion, a reading of the points and an extent
+/// that were learned.
+///
+/// ## Recursion
+/// With a memory `c` (LSTM) and heads `f`, `h`, `e` in the frame of the object, which see neither position nor direction:
+/// ```text
+/// predict   c, and from it by f:   v⁻ = v + Δ_v,  p⁻ = p + T (v⁻ + Δ_p),   P⁻ = J P Jᵀ + Q,   axes and weight of the extent
+/// update    the points in the frame, each through two layers, then mean and maximum over them; with count, scatter and c by h:
+///           a centre z = z̄ + Δ with the covariance L Lᵀ, and the direction in which the object moves: a Kalman update with both
+///           axes by the rule of Feldmann, Fränken and Koch in the frame of the object
+/// extent    by e: direction between the course of the updated velocity and that of the scatter, axes, weight
+/// ```
+/// `Δ_v` has a part that is said in the frame of the heading, weights of past velocities, and a share of what weights expect that
+/// are identified while the object is tracked ([`Identification`]). Scale and sensor noise of the [`Scattering`] are inside. A
+/// network that says nothing is a random-matrix filter in straight motion. A scan without points, or none, is a prediction.
+///
+/// ## Use it when
+/// there is a model trained for such objects: their motion has a memory, they point where they go, or the points tell more than
+/// count, mean and scatter. [`Aligned`](tercel_core::extended::Aligned) is the filter to compare with, where the size is known.
+///
+/// ## Reference
+/// RMMNet paper, section III. The form here is ours: frame, points, the update of the direction and the extent after the update are
+/// not in the paper, whose additive extent cannot follow an object that turns faster than its shape is averaged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RmmNet {
+    network: Arc<RmmNetwork>,
+    scattering: Scattering,
+}
+
+/// Points for which a new belief has room.
+const ROOM: usize = 64;
+
+impl RmmNet {
+    /// A filter of this network, for a sensor whose points spread so.
+    pub fn new(network: Arc<RmmNetwork>, scattering: Scattering) -> Self {
+        RmmNet { network, scattering }
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Arc<RmmNetwork> {
+        &self.network
+    }
+
+    /// The first semi-axes, how many points they are worth, and the deviation of a first velocity.
+    fn beginning(&self) -> ([f64; 2], f64, f64) {
+        match &self.network.layers {
+            Layers::Aligned(layers) => {
+                let options = &layers.options;
+                (options.axes, options.worth, options.speed)
+            }
+            Layers::Published(layers) => {
+                let (extent, weight) = layers.options.first_extent();
+                ([extent.xx.sqrt(), extent.yy.sqrt()], weight, layers.options.speed)
+            }
+        }
+    }
+
+    /// The filter that compares scans with what is expected. Its motion is not used.
+    fn classical(&self) -> Result<RandomMatrix<ConstantVelocity>, FilterError> {
+        let (axes, worth, speed) = self.beginning();
+        let prior =
+            InverseWishart::new(Matrix2::from_diagonal(&Vector2::from(axes.map(|axis| axis * axis))), worth)?;
+        let evolution = Evolution::wishart(2.0, Freedom::Exact)?;
+        let motion = ConstantVelocity::new(0.0).with_speed(speed);
+        Ok(RandomMatrix::new(motion, self.scattering, prior, evolution, Rule::Distorted))
+    }
+
+    fn compared(&self, belief: &RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
+        let expected = GaussianInverseWishart { state: belief.state, extent: belief.extent()?, rate: None };
+        self.classical()?.innovation(&expected, points)
+    }
+}
+
+impl Filter<4> for RmmNet {
+    type Belief = RmmNetBelief;
+    type Measurement = Points;
+
+    fn birth(&self, points: &Points) -> Result<RmmNetBelief, FilterError> {
+        // The classical filter refuses what is no beginning.
+        let _: GaussianInverseWishart<4> = self.classical()?.birth(points)?;
+        let (axes, worth, speed) = self.beginning();
+        let (motion, angle) = begin(points, &self.scattering, axes, speed);
+        // As published, the extent of a new object lies along the axes of the plane.
+        let (angle, order) = match &self.network.layers {
+            Layers::Aligned(layers) => (angle, layers.options.identification),
+            Layers::Published(_) => (0.0, Identification { order: 0, ..Identification::default() }),
+        };
+        let memory = vec![0.0; self.network.memory()];
+        Ok(RmmNetBelief {
+            state: gaussian(&motion),
+            axes: axes.map(f64::ln),
+            worth,
+            angle,
+            ln_weight: worth.ln(),
+            held: angle,
+            correction: [0.0; 4],
+            measured: true,
+            regression: Regression::new(&order),
+            memory: Memory::new(&memory, self.network.scratch()),
+            room: belief::Room(vec![0.0; self.network.room(points.count().max(ROOM))]),
+        })
+    }
+
+    fn predict(&self, belief: &mut RmmNetBelief, dt: f64) {
+        if dt == 0.0 {
+            return;
+        }
+        let length = Length { dt, share: dt / self.network.hyper().interval };
+        match &self.network.layers {
+            Layers::Aligned(layers) => layers.predict(belief, length),
+            Layers::Published(layers) => layers.predict(belief, dt),
+        }
+    }
+
+    fn update(&self, belief: &mut RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
+        let innovation = self.compared(belief, points)?;
+        if points.is_empty() {
+            return Ok(innovation);
+        }
+        match &self.network.layers {
+            Layers::Aligned(layers) => layers.update(belief, points, &self.scattering)?,
+            Layers::Published(layers) => layers.update(belief, points, &self.scattering)?,
+        }
+        belief.measured = true;
+        Ok(innovation)
+    }
+
+    fn innovation(&self, belief: &RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
+        self.compared(belief, points)
+    }
+
+    fn state(&self, belief: &RmmNetBelief) -> Gaussian<4> {
+        belief.state
+    }
+
+    fn set_state(&self, belief: &mut RmmNetBelief, state: &Gaussian<4>) {
+        belief.state = *state;
+    }
+
+    fn merge(&self, belief: &mut RmmNetBelief, weight: f64, other: &RmmNetBelief, other_weight: f64) {
+        belief.merge(weight, other, other_weight);
+    }
+
+    fn extent(&self, belief: &RmmNetBelief) -> Option<InverseWishart> {
+        belief.extent().ok()
+    }
+
+    fn set_extent(&self, belief: &mut RmmNetBelief, extent: &InverseWishart) {
+        belief.set_extent(extent);
+    }
+
+    fn estimate(&self, belief: &RmmNetBelief) -> Estimate<4> {
+        Estimate { extent: belief.extent().ok().map(|extent| extent.mean()), ..belief.state.into() }
+    }
+
+    fn reach(&self, belief: &RmmNetBelief) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        let spread = self.scattering.spread(&belief.extent().ok()?.mean());
+        let covariance = belief.state.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        Some((belief.state.mean.xy(), covariance + spread))
+    }
+
+    fn place(&self, points: &Points) -> Option<Vector2<f64>> {
+        (!points.is_empty()).then(|| points.mean())
+    }
+
+    fn area(&self, _: &Points) -> f64 {
+        1.0
+    }
+
+    fn ln_clutter(&self, points: &Points, intensity: f64) -> f64 {
+        points.count() as f64 * intensity.ln()
+    }
+}

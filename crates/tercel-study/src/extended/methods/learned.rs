@@ -1,0 +1,28 @@
+//! Learned filters, with the models that come with Tercel.
+
+use std::sync::Arc;
+
+use tercel_core::error::FilterError;
+use tercel_neural::filter::{RmmNet, RmmNetwork};
+use tercel_neural::shipped;
+
+use super::matrix::sensor;
+use super::{Method, Recording, StepEstimate};
+use crate::error::StudyError;
+use crate::extended::recording::follow;
+
+/// An RMMNet, told how points spread.
+pub(super) struct Remembering(Arc<RmmNetwork>);
+
+impl Remembering {
+    /// With the shipped model of this name.
+    pub fn new(model: &str) -> Result<Self, StudyError> {
+        Ok(Remembering(Arc::new(RmmNetwork::from_model(&shipped::model(model)?)?)))
+    }
+}
+
+impl Method for Remembering {
+    fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
+        follow::<4, _>(recording, &RmmNet::new(Arc::clone(&self.0), sensor(recording)?))
+    }
+}

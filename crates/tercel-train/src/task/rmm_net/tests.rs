@@ -1,0 +1,306 @@
+use nalgebra::Vector4;
+use tercel_core::belief::Gaussian;
+use tercel_core::extended::Points;
+use tercel_core::filter::Filter;
+use tercel_neural::filter::rmm_net::{Kinematics, Symmetric, Track, View};
+use tercel_neural::filter::{RmmNet, RmmNetBelief, RmmNetwork};
+
+use super::operations::{Given, Step};
+use super::rows::{TRACK, numbers};
+use super::*;
+use crate::Initial;
+use crate::backend::values;
+use crate::task::repository;
+
+const RECIPE: &str = "
+version = 1
+kind = \"rmmnet\"
+name = \"small\"
+seed = 3
+[data]
+training = 8
+validation = 4
+steps = 1001
+interval = 1.0
+points = 12.0
+noise = [1.0, 0.64]
+empty = 0.1
+born = 0.5
+[data.source]
+kind = \"vehicles\"
+generators = [\"smooth\", \"reject\"]
+mixed = 0.5
+[model]
+interval = 1.0
+memory = 7
+[model.form]
+kind = \"aligned\"
+hidden = 6
+encoder = 5
+identification = { order = 4 }
+[loss]
+window = 4
+";
+
+/// The task of a recipe, with parameters that have a say.
+fn task(text: &str) -> (RmmNetTask, ParameterSet) {
+    let recipe = Recipe::<RmmNetKind>::parse(text).unwrap();
+    let (task, mut set) = RmmNetTask::new(&recipe, None).unwrap();
+    for (name, values) in set.values_mut() {
+        if name.contains("output") {
+            values.iter_mut().enumerate().for_each(|(i, value)| *value += 0.1 * (i as f32 * 1.3).sin());
+        }
+    }
+    (task, set)
+}
+
+fn draw(samples: &[u64]) -> Draw<'_> {
+    Draw { split: Split::Training, epoch: 0, seed: 3, samples }
+}
+
+#[test]
+fn the_filter_does_what_was_trained() {
+    let (task, set) = task(RECIPE);
+    agree(&task, &set, 1000);
+}
+
+/// The same recipe in the form of the publication.
+fn published(options: &str) -> String {
+    let start = RECIPE.find("[model.form]").unwrap();
+    let end = RECIPE.find("[loss]").unwrap();
+    let form = format!("[model.form]\nkind = \"published\"\n{options}\n");
+    format!("{}{form}[loss]\nsquares = 1.0\nwindow = 4\n", &RECIPE[..start]).replace("1001", "401")
+        + &RECIPE[end..end]
+}
+
+#[test]
+fn the_filter_of_the_publication_does_what_was_trained_whatever_blocks_it_has() {
+    for options in [
+        "",
+        "blocks = { memory = false }",
+        "blocks = { prediction = false }\ntransition = \"keeping\"",
+        "blocks = { update = false }",
+        "transition = \"turning\"\ndistorted = true\nprinted = false",
+    ] {
+        let (task, set) = task(&published(options));
+        agree(&task, &set, 400);
+    }
+}
+
+#[test]
+fn the_shipped_models_do_what_was_trained() {
+    for (model, text) in repository::models(RmmNetKind::NAME) {
+        let mut recipe = Recipe::<RmmNetKind>::parse(&text).unwrap();
+        recipe.data.steps = 1001;
+        let (task, mut set) = RmmNetTask::new(&recipe, Some(flights(1001))).unwrap();
+        repository::fill(&mut set, &model);
+        agree(&task, &set, 1000);
+    }
+}
+
+/// Aircraft that turn slowly, with a speed that is never quite the same, every four seconds.
+fn flights(steps: usize) -> Tracks {
+    let flight = |number: usize| {
+        let mut place = nalgebra::Vector2::zeros();
+        let state = |step: usize| {
+            let (k, phase) = (step as f64, 0.7 * number as f64);
+            let (course, speed) =
+                (0.02 * k + (0.05 * k + phase).sin(), 100.0 + 12.0 * (2.1 * k + phase).sin());
+            let velocity = nalgebra::Vector2::new(course.cos(), course.sin()) * speed;
+            place += velocity * 4.0;
+            Vector4::new(place.x, place.y, velocity.x, velocity.y)
+        };
+        (0..steps).map(state).collect()
+    };
+    Tracks::new((0..10).map(flight).collect())
+}
+
+/// Compares the differentiable model and the filter over some steps of three objects.
+fn agree(task: &RmmNetTask, set: &ParameterSet, steps: usize) {
+    let rides = task.batch(draw(&[1, 2, 3])).unwrap();
+    let model = Model::new(task.card(), set.tensors()).unwrap();
+    let scattering = task.data.scattering().unwrap();
+    let filter = RmmNet::new(Arc::new(RmmNetwork::from_model(&model).unwrap()), scattering);
+    let begin = |member: usize| -> RmmNetBelief {
+        let mut belief = filter.birth(&rides.scans[0][member]).unwrap();
+        filter.set_state(&mut belief, &gaussian(&rides.births[member].0));
+        belief
+    };
+    let mut beliefs: Vec<_> = (0..3).map(begin).collect();
+    let weights = Weights::frozen(set);
+    let mut state = task.first(&rides);
+    for step in 1..=steps {
+        let row;
+        (state, row) = task.step(&weights, &rides, state, step);
+        let found = values(&row);
+        for (member, belief) in beliefs.iter_mut().enumerate() {
+            filter.predict(belief, task.data.interval);
+            filter.update(belief, &rides.scans[step][member]).unwrap();
+            let width = task.layout().width();
+            let row: Vec<f64> = found[member * width..][..width].iter().map(|x| f64::from(*x)).collect();
+            let said = task.layout().read(&row);
+            let (ran, trained) = (filter.state(belief), gaussian(&said.motion));
+            for i in 0..4 {
+                let error = (trained.mean[i] - ran.mean[i]).abs();
+                // Relative to the length of the vector: its direction is anybody's.
+                let pair = i / 2 * 2;
+                let scale = ran.mean[pair].hypot(ran.mean[pair + 1]).max(10.0) + ran.deviations()[i];
+                assert!(error < 1e-4 * scale, "step {step}, member {member}, {i}: {error}");
+            }
+            let off = (trained.covariance - ran.covariance).norm() / ran.covariance.norm();
+            assert!(off < 1e-3, "step {step}, member {member}: {off}");
+            let extent = filter.extent(belief).unwrap();
+            let trained =
+                nalgebra::Matrix2::new(said.extent.xx, said.extent.xy, said.extent.xy, said.extent.yy);
+            let off = (trained - extent.mean()).norm() / extent.mean().norm();
+            assert!(off < 1e-3, "step {step}, member {member}: {off}");
+            let off = (said.ln_weight.exp() / extent.weight() - 1.0).abs();
+            assert!(off < 1e-3, "step {step}, member {member}: weight {off}");
+        }
+    }
+}
+
+fn gaussian(motion: &Kinematics<f64>) -> Gaussian<4> {
+    let Kinematics { place, velocity, place_covariance: pp, cross: c, velocity_covariance: vv } = motion;
+    Gaussian {
+        mean: Vector4::new(place[0], place[1], velocity[0], velocity[1]),
+        covariance: nalgebra::Matrix4::new(
+            pp.xx, pp.xy, c[0][0], c[0][1], //
+            pp.xy, pp.yy, c[1][0], c[1][1], //
+            c[0][0], c[1][0], vv.xx, vv.xy, //
+            c[0][1], c[1][1], vv.xy, vv.yy,
+        ),
+    }
+}
+
+#[test]
+fn the_gradients_of_a_step_and_its_cost_are_their_slopes() {
+    let (mut task, _) = task(RECIPE);
+    // In the score of the extent its mean counts as given.
+    task.costs.score = 0.0;
+    let rides = task.batch(draw(&[1, 2, 5])).unwrap();
+    let Net::Aligned(net) = &task.net else { panic!("another form") };
+    let (options, sizes) = (&net.options, net.options.sizes());
+    let step = (1..200).find(|step| rides.scans[*step].iter().any(Points::is_empty)).unwrap();
+    let mut tracks = Vec::new();
+    let mut given = Vec::new();
+    for member in 0..3 {
+        let truth = rides.truth[step][member].state;
+        let root =
+            nalgebra::Matrix4::from_fn(
+                |i, j| {
+                    if i == j { 1.5 } else { 0.5 * ((i * 4 + j + member) as f64).sin() }
+                },
+            );
+        let p = root * root.transpose();
+        let block = |i: usize| Symmetric { xx: p[(i, i)], xy: p[(i, i + 1)], yy: p[(i + 1, i + 1)] };
+        let motion = Kinematics {
+            place: [truth[0] - truth[2] + 0.4, truth[1] - truth[3] - 0.3],
+            velocity: [truth[2] + 0.2, truth[3] + 0.3],
+            place_covariance: block(0),
+            cross: [[p[(0, 2)], p[(0, 3)]], [p[(1, 2)], p[(1, 3)]]],
+            velocity_covariance: block(2),
+        };
+        let track = Track { motion, axes: [1.6, 0.3], worth: 9.0 };
+        let points = &rides.scans[step][member];
+        let scattering = (0.25, &net.scattering.noise());
+        let view = (!points.is_empty()).then(|| View::new(options, &track, 0.3, points, scattering));
+        tracks.extend(numbers(&track).map(|x| x as f32));
+        let velocities = (0..5).map(|i| [f64::from(i).sin(), 2.0 * f64::from(i).cos()]).collect();
+        given.push(Given { heading: [0.6, 0.8], velocities, expected: [1.5, -0.5], held: 0.3, view });
+    }
+    let operation = Step { options: Arc::clone(options), length: net.length, given: Arc::new(given) };
+    let judge =
+        Judge { costs: task.costs, layout: task.layout(), truth: Arc::new(rides.truth[step].clone()) };
+    let mut set = ParameterSet::new(1);
+    set.add("tracks", &[3, TRACK], Initial::Values(tracks)).unwrap();
+    for (name, width) in
+        [("motion", sizes.motion_said), ("scan", sizes.scan_said), ("extent", sizes.extent_said)]
+    {
+        let values = (0..3 * width).map(|i| 0.5 * (i as f32 * 1.3).sin()).collect();
+        set.add(name, &[3, width], Initial::Values(values)).unwrap();
+    }
+    let value = |weights: &Weights| {
+        let inputs = [0, 1, 2, 3].map(|place| weights.tensors()[place].clone());
+        let row = apply(operation.clone(), inputs);
+        apply(judge.clone(), [row]).sum().reshape([1, 1])
+    };
+    let trainable = Weights::trainable(&set);
+    let found = trainable.gradients(&value(&trainable));
+    for (place, gradients) in found.iter().enumerate() {
+        for (index, gradient) in gradients.iter().enumerate() {
+            // What weights expect and the last velocity count as given.
+            if place == 0 && (2..4).contains(&(index % TRACK)) {
+                continue;
+            }
+            let moved = |by: f32| {
+                let mut set = set.clone();
+                set.values_mut().nth(place).unwrap().1[index] += by;
+                f64::from(values(&value(&Weights::frozen(&set)))[0])
+            };
+            let slope = (moved(5e-3) - moved(-5e-3)) / 1e-2;
+            let error = (slope - f64::from(*gradient)).abs();
+            assert!(error < 5e-3 + 0.02 * slope.abs(), "{place} {index}: {gradient} for {slope}");
+        }
+    }
+    assert!(found.iter().all(|of| of.iter().any(|gradient| gradient.abs() > 1e-2)));
+}
+
+#[test]
+fn the_gradients_of_the_whole_loss_are_its_slopes_where_nothing_counts_as_given() {
+    let (mut task, set) = task(RECIPE);
+    task.costs.score = 0.0;
+    let rides = task.batch(draw(&[1, 2, 3])).unwrap();
+    let loss = |weights: &Weights| {
+        let (_, row) = task.step(weights, &rides, task.first(&rides), 1);
+        let judge =
+            Judge { costs: task.costs, layout: task.layout(), truth: Arc::new(rides.truth[1].clone()) };
+        apply(judge, [row]).mean().reshape([1, 1])
+    };
+    let weights = Weights::trainable(&set);
+    let found = weights.gradients(&loss(&weights));
+    // What the last head says is seen by nothing else.
+    for (place, entry) in set.iter().enumerate().filter(|(_, entry)| entry.name().starts_with("extent")) {
+        for index in (0..found[place].len()).step_by(1 + found[place].len() / 20) {
+            let moved = |by: f32| {
+                let mut set = set.clone();
+                set.values_mut().nth(place).unwrap().1[index] += by;
+                f64::from(values(&loss(&Weights::frozen(&set)))[0])
+            };
+            let slope = (moved(1e-2) - moved(-1e-2)) / 2e-2;
+            let error = (slope - f64::from(found[place][index])).abs();
+            assert!(error < 2e-3 + 0.03 * slope.abs(), "{} {index}: {slope}", entry.name());
+        }
+    }
+}
+
+#[test]
+fn a_recipe_that_makes_no_sense_is_refused_by_key() {
+    let check = |text: &str| RmmNetTask::new(&Recipe::<RmmNetKind>::parse(text)?, None).map(drop);
+    for (old, new, key) in [
+        ("steps = 1001", "steps = 1", "data.steps"),
+        ("points = 12.0", "points = 0.0", "data.points"),
+        ("noise = [1.0, 0.64]", "noise = [1.0, -0.64]", "data.noise[1]"),
+        ("empty = 0.1", "empty = 1.0", "data.empty"),
+        ("[\"smooth\", \"reject\"]", "[]", "generators"),
+        ("\"smooth\"", "\"rough\"", "rough"),
+        ("memory = 7", "memory = 0", "memory"),
+        ("order = 4", "order = 100", "order"),
+        ("hidden = 6", "hidden = 6\nchange = -1.0", "change"),
+        ("window = 4", "window = 4\nshape = -1.0", "loss.shape"),
+        ("interval = 1.0\nmemory", "interval = 2.0\nmemory", "model.interval"),
+    ] {
+        let refusal = repository::refusal(RECIPE, (old, new), check);
+        assert!(refusal.contains(key), "{new}: {refusal}");
+    }
+}
+
+#[test]
+fn a_recipe_that_needs_tracks_says_how_they_are_named() {
+    let tracks = "kind = \"tracks\"\naxes = [36.95, 32.4]\nfolds = 5\nfold = 0\n";
+    let start = RECIPE.find("kind = \"vehicles\"").unwrap();
+    let end = RECIPE.find("[model]").unwrap();
+    let text = format!("{}{tracks}{}", &RECIPE[..start], &RECIPE[end..]);
+    let error = RmmNetTask::new(&Recipe::<RmmNetKind>::parse(&text).unwrap(), None).unwrap_err();
+    assert!(error.to_string().contains("--data"), "{error}");
+}
