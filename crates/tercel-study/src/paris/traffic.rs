@@ -58,6 +58,8 @@ pub struct Traffic {
     tracks: Vec<Vec<Report>>,
     begin: f64,
     windows: u64,
+    /// What the radar watches, along both axes.
+    side: Interval,
 }
 
 impl Traffic {
@@ -81,7 +83,7 @@ impl Traffic {
             let path = path.display();
             return Err(StudyError::Option(format!("{path}: its reports span less than ten minutes")));
         }
-        Ok(Traffic { tracks, begin, windows: windows as u64 })
+        Ok(Traffic { tracks, begin, windows: windows as u64, side: Interval::new(-REACH, REACH)? })
     }
 
     /// Number of windows.
@@ -93,9 +95,8 @@ impl Traffic {
     pub fn recording(&self, seed: u64, run: u64) -> Recording {
         let begin = self.begin + (run % self.windows) as f64 * INTERVAL * STEPS as f64;
         let objects = self.tracks.iter().flat_map(|track| objects(track, begin)).collect();
-        let side = Interval::fixed(-REACH, REACH);
         let sensor = Sensor { deviation: RANGE, detection: DETECTION, clutter: CLUTTER };
-        let scene = Scene::recorded(objects, [side, side], sensor, STEPS, INTERVAL);
+        let scene = Scene::recorded(objects, [self.side, self.side], sensor, STEPS, INTERVAL);
         let plots = observe(&scene, seed, run);
         let polar =
             |plot: &Plot| Measurement::from([plot.position.norm(), plot.position.y.atan2(plot.position.x)]);
@@ -196,7 +197,12 @@ mod tests {
 
     #[test]
     fn a_window_holds_what_flies_in_it_and_the_same_run_is_the_same() {
-        let traffic = Traffic { tracks: unbroken(track()), begin: 0.0, windows: 1 };
+        let traffic = Traffic {
+            tracks: unbroken(track()),
+            begin: 0.0,
+            windows: 1,
+            side: Interval::new(-REACH, REACH).unwrap(),
+        };
         let recording = traffic.recording(3, 0);
         assert_eq!(recording.scene.objects().len(), 2);
         assert_eq!(recording.scans.len(), STEPS);
