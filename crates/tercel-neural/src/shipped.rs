@@ -47,6 +47,7 @@ const FILES: &[(&str, &[u8])] = files![
     "neural-imm",
     "neural-imm-position",
     "rmmnet-aircraft",
+    "rmmnet-crossing",
     "rmmnet-vehicle",
     "tr-mtt",
 ];

@@ -112,7 +112,7 @@ mod tests {
         for (name, figures) in METHODS.iter().zip(&figures) {
             assert!(figures[0] < 25.0, "{name}: GOSPA {}", figures[0]);
         }
-        for (name, figures) in METHODS.iter().zip(&figures).take(2) {
+        for (name, figures) in METHODS.iter().zip(&figures).take(4) {
             assert!(figures[4] > 0.5, "{name}: IoU {}", figures[4]);
         }
     }

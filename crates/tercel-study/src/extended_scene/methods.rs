@@ -4,7 +4,11 @@
 //! |---|---|---|
 //! | `giw-phd` | random matrix with a rate of points | PHD |
 //! | `giw-nearest-neighbour` | the same | global nearest neighbour |
+//! | `rmmnet-phd` | random matrix with a learned memory, and the same rate | PHD |
+//! | `rmmnet-nearest-neighbour` | the same | global nearest neighbour |
 //! | `point-phd` | Kalman filter on the means of the cells | PHD |
+
+use std::sync::Arc;
 
 use nalgebra::{Matrix2, Vector2};
 use tercel_core::belief::Gaussian;
@@ -20,12 +24,15 @@ use tercel_core::multi::{
     Tracker,
 };
 use tercel_core::sensor::{Measurement, Position};
+use tercel_neural::filter::{RmmNet, RmmNetBelief, RmmNetwork};
+use tercel_neural::shipped;
 use tercel_sim::extended::Crossing;
 
 use crate::StudyError;
 
 /// Names of all methods.
-pub const METHODS: [&str; 3] = ["giw-phd", "giw-nearest-neighbour", "point-phd"];
+pub const METHODS: [&str; 5] =
+    ["giw-phd", "giw-nearest-neighbour", "rmmnet-phd", "rmmnet-nearest-neighbour", "point-phd"];
 
 /// A confirmed object after a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +84,10 @@ pub(super) fn method(name: &str, scene: &Crossing) -> Result<Box<dyn Method>, St
     Ok(match name {
         "giw-phd" => Box::new(Cells { sensor, phd: true }),
         "giw-nearest-neighbour" => Box::new(Cells { sensor, phd: false }),
+        "rmmnet-phd" => Box::new(Remembering { filter: remembering(&sensor)?, sensor, phd: true }),
+        "rmmnet-nearest-neighbour" => {
+            Box::new(Remembering { filter: remembering(&sensor)?, sensor, phd: false })
+        }
         "point-phd" => Box::new(Means { sensor }),
         _ => {
             let known = METHODS.join(", ");
@@ -120,6 +131,37 @@ impl Method for Cells {
         } else {
             let tracker = NearestNeighbour::<Belief>::new(NearestNeighbourConfig::default())?;
             follow(tracker, &filter, &self.sensor, scans, cells, read)
+        }
+    }
+}
+
+/// Random matrices with a learned memory on cells.
+struct Remembering {
+    filter: RmmNet,
+    sensor: Sensor,
+    phd: bool,
+}
+
+/// The filter with the model that comes with Tercel for such objects.
+fn remembering(sensor: &Sensor) -> Result<RmmNet, StudyError> {
+    let network = Arc::new(RmmNetwork::from_model(&shipped::model("rmmnet-crossing")?)?);
+    let filter = RmmNet::new(network, Scattering::uniform(sensor.noise)?);
+    Ok(filter.with_rate(Rate::new(sensor.points, 3.0)?, 20.0)?)
+}
+
+impl Method for Remembering {
+    fn follow(&self, scans: &[Vec<Vector2<f64>>]) -> Result<Vec<Vec<Report>>, FilterError> {
+        let cells = |scan: &Vec<Vector2<f64>>| distance_partition(scan, DISTANCE);
+        let read = |belief: &RmmNetBelief| {
+            let estimate = self.filter.estimate(belief);
+            (estimate.mean.xy(), estimate.extent)
+        };
+        if self.phd {
+            let tracker = Phd::<RmmNetBelief>::new(PhdConfig::default())?;
+            follow(tracker, &self.filter, &self.sensor, scans, cells, read)
+        } else {
+            let tracker = NearestNeighbour::<RmmNetBelief>::new(NearestNeighbourConfig::default())?;
+            follow(tracker, &self.filter, &self.sensor, scans, cells, read)
         }
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector4};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
-use tercel_core::extended::{InverseWishart, eigen};
+use tercel_core::extended::{InverseWishart, Rate, eigen};
 
 use super::features::Before;
 use super::kinematics::Kinematics;
@@ -24,6 +24,8 @@ pub struct RmmNetBelief {
     pub(super) ln_weight: f64,
     /// The direction before the last prediction, which an object that stands keeps, rad.
     pub(super) held: f64,
+    /// How many points it gives, if the filter estimates that.
+    pub(super) rate: Option<Rate>,
     /// What the measurements of the present step changed, and whether there was one.
     pub(super) correction: [f64; 4],
     pub(super) measured: bool,
@@ -140,6 +142,9 @@ impl RmmNetBelief {
         let mix = |ours: &mut f64, theirs: f64| *ours += share * (theirs - *ours);
         for i in 0..2 {
             mix(&mut self.axes[i], other.axes[i]);
+        }
+        if let (Some(rate), Some(other)) = (&mut self.rate, &other.rate) {
+            rate.merge(weight, other, other_weight);
         }
         mix(&mut self.worth, other.worth);
         mix(&mut self.ln_weight, other.ln_weight);

@@ -19,7 +19,7 @@ use nalgebra::{Matrix2, Vector2};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::extended::{
-    Evolution, Freedom, GaussianInverseWishart, InverseWishart, Points, RandomMatrix, Rule, Scattering,
+    Evolution, Freedom, GaussianInverseWishart, InverseWishart, Points, RandomMatrix, Rate, Rule, Scattering,
 };
 use tercel_core::filter::{Estimate, Filter, Innovation};
 use tercel_core::motion::ConstantVelocity;
@@ -73,6 +73,7 @@ pub(super) const KIND: &str = "rmmnet";
 pub struct RmmNet {
     network: Arc<RmmNetwork>,
     scattering: Scattering,
+    rate: Option<(Rate, f64)>,
 }
 
 /// Points for which a new belief has room.
@@ -81,7 +82,18 @@ const ROOM: usize = 64;
 impl RmmNet {
     /// A filter of this network, for a sensor whose points spread so.
     pub fn new(network: Arc<RmmNetwork>, scattering: Scattering) -> Self {
-        RmmNet { network, scattering }
+        RmmNet { network, scattering, rate: None }
+    }
+
+    /// Estimates how many points an object gives, too, from this prior, which is forgotten over `time` seconds: trackers of many
+    /// objects can then tell an object that gives few points from one that gives many.
+    ///
+    /// # Errors
+    /// When the time is not positive.
+    pub fn with_rate(self, prior: Rate, time: f64) -> Result<Self, FilterError> {
+        // The same range as that of the filter that compares.
+        self.classical()?.with_rate(prior, time)?;
+        Ok(RmmNet { rate: Some((prior, time)), ..self })
     }
 
     /// The network.
@@ -110,11 +122,16 @@ impl RmmNet {
             InverseWishart::new(Matrix2::from_diagonal(&Vector2::from(axes.map(|axis| axis * axis))), worth)?;
         let evolution = Evolution::wishart(2.0, Freedom::Exact)?;
         let motion = ConstantVelocity::new(0.0).with_speed(speed);
-        Ok(RandomMatrix::new(motion, self.scattering, prior, evolution, Rule::Distorted))
+        let filter = RandomMatrix::new(motion, self.scattering, prior, evolution, Rule::Distorted);
+        match self.rate {
+            Some((rate, time)) => filter.with_rate(rate, time),
+            None => Ok(filter),
+        }
     }
 
     fn compared(&self, belief: &RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
-        let expected = GaussianInverseWishart { state: belief.state, extent: belief.extent()?, rate: None };
+        let expected =
+            GaussianInverseWishart { state: belief.state, extent: belief.extent()?, rate: belief.rate };
         self.classical()?.innovation(&expected, points)
     }
 }
@@ -125,7 +142,7 @@ impl Filter<4> for RmmNet {
 
     fn birth(&self, points: &Points) -> Result<RmmNetBelief, FilterError> {
         // The classical filter refuses what is no beginning.
-        let _: GaussianInverseWishart<4> = self.classical()?.birth(points)?;
+        let first: GaussianInverseWishart<4> = self.classical()?.birth(points)?;
         let (axes, worth, speed) = self.beginning();
         let (motion, angle) = begin(points, &self.scattering, axes, speed);
         // As published, the extent of a new object lies along the axes of the plane.
@@ -141,6 +158,7 @@ impl Filter<4> for RmmNet {
             angle,
             ln_weight: worth.ln(),
             held: angle,
+            rate: first.rate,
             correction: [0.0; 4],
             measured: true,
             regression: Regression::new(&order),
@@ -153,6 +171,9 @@ impl Filter<4> for RmmNet {
         if dt == 0.0 {
             return;
         }
+        if let (Some(rate), Some((_, time))) = (&mut belief.rate, self.rate) {
+            rate.forget((-dt.abs() / time).exp());
+        }
         let length = Length { dt, share: dt / self.network.hyper().interval };
         match &self.network.layers {
             Layers::Aligned(layers) => layers.predict(belief, length),
@@ -162,14 +183,19 @@ impl Filter<4> for RmmNet {
 
     fn update(&self, belief: &mut RmmNetBelief, points: &Points) -> Result<Innovation, FilterError> {
         let innovation = self.compared(belief, points)?;
+        let mut rate = belief.rate;
+        if let Some(rate) = &mut rate {
+            rate.add(points.count());
+        }
         if points.is_empty() {
+            belief.rate = rate;
             return Ok(innovation);
         }
         match &self.network.layers {
             Layers::Aligned(layers) => layers.update(belief, points, &self.scattering)?,
             Layers::Published(layers) => layers.update(belief, points, &self.scattering)?,
         }
-        belief.measured = true;
+        (belief.rate, belief.measured) = (rate, true);
         Ok(innovation)
     }
 

@@ -119,6 +119,9 @@ impl Regression {
 
     /// The velocity that the weights expect next, m/s.
     pub fn expected(&self) -> [f64; 2] {
+        if self.order == 0 {
+            return self.past[0];
+        }
         [0, 1].map(|axis| self.past.iter().zip(&self.weights).map(|(v, w)| v[axis] * w).sum())
     }
 

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use tercel_core::extended::{Points, Scattering};
 use tercel_neural::filter::rmm_net::{Kinematics, Symmetric, begin};
-use tercel_sim::extended::{Generator, Heading, Ride, Scatterers, Sizes, Vehicle};
+use tercel_sim::extended::{Crossing, Generator, Heading, Ride, Scatterers, Sizes, Vehicle};
 
 use super::cost::Truth;
 use crate::TrainError;
@@ -54,6 +54,8 @@ pub enum Source {
         #[serde(default)]
         fresh: bool,
     },
+    /// The objects of simulated crossings, which go straight but for small disturbances.
+    Crossings,
     /// Recorded tracks, which the program is given.
     Tracks {
         /// Semi-axes, along the course and across, m.
@@ -119,6 +121,12 @@ impl RmmNetData {
                 }
                 within("data.source.mixed", *mixed, 0.0..1.0 + f64::EPSILON)
             }
+            Source::Crossings => {
+                if self.interval != 1.0 {
+                    return Err(refused("data.interval", self.interval, "crossings have a step of 1 s"));
+                }
+                Ok(())
+            }
             Source::Tracks { axes, folds, fold } => {
                 positive("data.source.axes[0]", axes[0])?;
                 positive("data.source.axes[1]", axes[1])?;
@@ -161,12 +169,19 @@ impl RmmNetData {
         random: &mut ChaCha8Rng,
     ) -> Result<Ride, TrainError> {
         let failed = |error: tercel_sim::SimulationError| TrainError::Data(error.to_string());
+        let split = if draw.split == Split::Training { 0x7472 } else { 0x7661 };
+        let seed = draw.seed ^ (split << 16);
+        let seed = if seed == RESERVED { !seed } else { seed };
         match &self.source {
+            Source::Crossings => {
+                let objects = 3;
+                let number = sample / objects + ((draw.epoch as u64) << 32);
+                let crossing = Crossing::new(self.scatterers()?).with_objects(objects as usize);
+                let mut rides = crossing.draw(seed, number).rides;
+                Ok(rides.swap_remove((sample % objects) as usize))
+            }
             Source::Vehicles { generators, mixed, fresh } => {
                 let number = if *fresh { sample + ((draw.epoch as u64) << 32) } else { sample };
-                let split = if draw.split == Split::Training { 0x7472 } else { 0x7661 };
-                let seed = draw.seed ^ (split << 16);
-                let seed = if seed == RESERVED { !seed } else { seed };
                 let generator = generators[sample as usize % generators.len()].generator();
                 let vehicle = Vehicle::new(generator).with_steps(self.steps).map_err(failed)?;
                 // Apart from the random numbers of an epoch: the size belongs to the vehicle.

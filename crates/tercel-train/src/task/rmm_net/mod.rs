@@ -109,7 +109,7 @@ impl RmmNetTask {
                 ));
             }
             (Source::Tracks { .. }, Some(tracks)) => tracks,
-            (Source::Vehicles { .. }, _) => Tracks::default(),
+            (Source::Vehicles { .. } | Source::Crossings, _) => Tracks::default(),
         };
         let window = if costs.window == 0 { data.steps } else { costs.window };
         let mut set = ParameterSet::new(recipe.seed);
