@@ -392,7 +392,7 @@ fn particles_move_as_the_network_says() {
     for hyper in forms().into_iter().chain([paper_liquid()]) {
         let network = liquid(&hyper, 1.0);
         let radar = Position::new(5.0).unwrap();
-        let (gaussian, count) = (LiquidKalman::new(network.clone(), radar), 4000);
+        let (gaussian, count) = (LiquidKalman::new(network.clone(), radar), 400);
         let cloud = Particle::new(LiquidMotion::new(network), radar, count, 3).unwrap();
         let start = seen(0, 0.3, Vector2::zeros()).unwrap();
         let mut particles = cloud.birth(&start).unwrap();
@@ -406,7 +406,7 @@ fn particles_move_as_the_network_says() {
             let chance = 5.0 * theirs.covariance.diagonal().max().sqrt() / f64::from(count as u32).sqrt();
             assert!(off.amax() < chance, "{hyper:?}: {off} {chance}");
         }
-        for step in 1..60 {
+        for step in 1..25 {
             cloud.predict(&mut particles, if step == 20 { 0.0 } else { 1.0 });
             if let Some(seen) = seen(step, 0.3, Vector2::zeros()) {
                 // A cloud that has lost the object is told so, and stays finite.
