@@ -39,7 +39,6 @@ const FILES: &[(&str, &[u8])] = files![
     "kalman-net-straight",
     "kalman-net-straight-paper",
     "liquid",
-    "liquid-cfc",
     "liquid-gru",
     "liquid-mlp",
     "liquid-paper",

@@ -145,6 +145,7 @@ conformance!(
     })
 );
 
+#[allow(clippy::unwrap_used)]
 fn rmm_net(problem: &Problem) -> RmmNet {
     let scattering = tercel_core::extended::Scattering::uniform(problem.noise() * 0.5).unwrap();
     RmmNet::new(untrained::rmm_net(&untrained::small_rmm_net(), 0.3), scattering)

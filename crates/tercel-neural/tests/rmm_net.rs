@@ -38,7 +38,7 @@ fn scan(step: u32) -> Vec<Vector2<f64>> {
     let count = if step % 7 == 6 { 0 } else { 5 + step as usize % 13 };
     let mut point = || {
         let (radius, angle) = (random.random::<f64>().sqrt(), 6.28 * random.random::<f64>());
-        let noise = vector![random.random::<f64>() - 0.5, random.random::<f64>() - 0.5];
+        let noise = vector![random.random::<f64>() - 0.5, random.random::<f64>() - 0.5] * 6.0_f64.sqrt();
         centre
             + Rotation2::new(phase) * vector![6.0 * radius * angle.cos(), 1.25 * radius * angle.sin()]
             + noise
@@ -50,6 +50,11 @@ fn scan(step: u32) -> Vec<Vector2<f64>> {
 fn tracked(filter: &RmmNet, steps: u32, moved: impl Fn(Vector2<f64>) -> Vector2<f64>) -> RmmNetBelief {
     let points = |step| scan(step).into_iter().map(&moved).collect::<Points>();
     let mut belief = filter.birth(&points(0)).unwrap();
+    // It is known where the vehicle goes: one that stands has no front.
+    let velocity = moved(vector![4.0, 0.0]) - moved(vector![0.0, 0.0]);
+    let mut state = filter.state(&belief);
+    (state.mean.z, state.mean.w) = (velocity.x, velocity.y);
+    filter.set_state(&mut belief, &state);
     for step in 1..=steps {
         filter.predict(&mut belief, 1.0);
         filter.update(&mut belief, &points(step)).unwrap();
@@ -83,7 +88,7 @@ fn the_order_of_points_does_not_matter() {
 
 #[test]
 fn an_object_elsewhere_that_goes_elsewhere_is_followed_alike() {
-    let filter = filter(1.0);
+    let filter = filter(0.5);
     let here = filter.estimate(&tracked(&filter, 40, |point| point));
     for (angle, origin) in [(0.0, vector![3e5, -2e5]), (1.1, vector![0.0, 0.0]), (-2.6, vector![500.0, 80.0])]
     {
@@ -105,7 +110,7 @@ fn a_network_that_says_nothing_follows_a_vehicle_and_its_shape() {
     let estimate = filter.estimate(&belief);
     let phase: f64 = 4.0;
     let centre = vector![40.0 * phase.sin(), 40.0 - 40.0 * phase.cos()];
-    assert!((estimate.mean.xy() - centre).norm() < 2.0, "{}", estimate.mean);
+    assert!((estimate.mean.xy() - centre).norm() < 3.0, "{}", estimate.mean);
     let found = Ellipse::from_matrix(estimate.mean.xy(), &estimate.extent.unwrap()).unwrap();
     assert!((found.axes.x - 6.0).abs() < 1.5 && (found.axes.y - 1.25).abs() < 0.6, "{found:?}");
     assert!((found.angle - phase).sin().abs() < 0.3, "{found:?}");

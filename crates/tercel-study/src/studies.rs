@@ -195,7 +195,7 @@ pub const STUDIES: [Study; 13] = [
         about: "airliners on recorded tracks, seen as many points (RMMNet paper, Table II)",
         methods: extended::methods::AIRCRAFT_METHODS,
         kind: Kind::MonteCarlo(MonteCarlo {
-            sets: &["course", "smoothed", "crab"],
+            sets: &["course", "smoothed", "crab", "even"],
             data: true,
             ..MonteCarlo::new(extended::SEED, 52, |r| boxed(ExtendedExperiment::aircraft(r)))
         }),

@@ -101,6 +101,7 @@ impl ExtendedExperiment {
         // The study asks for data before it is built.
         let path = request.data.unwrap_or(std::path::Path::new(""));
         let aircraft = Aircraft::read(path, heading, true)?;
+        let aircraft = if request.set == "even" { aircraft.evened() } else { aircraft };
         let count = aircraft.count() as u64;
         if request.chosen_runs && request.runs > count {
             let runs = request.runs;

@@ -33,7 +33,7 @@ pub const PUBLISHED: [PublishedRow; 16] = [
     row("mem-rbpf-paper", "vehicle", [0.6013, 0.6388, 0.48191, 8.3421]),
     row("lstm", "vehicle", [32.2685, 2.4821, 0.00414, 3862.7581]),
     row("transformer", "vehicle", [47.4475, 2.9012, 0.00339, 4521.3716]),
-    row("rmmnet", "vehicle", [0.5933, 0.5910, 0.70425, 0.9182]),
+    row("rmmnet-paper", "vehicle", [0.5933, 0.5910, 0.70425, 0.9182]),
     row("b-rmm-paper", "aircraft", [12.2317, 8.8747, 0.324572, 863.9]),
     row("vb-rmm-paper", "aircraft", [7.2044, 12.4817, 0.538806, 274.3]),
     row("imm-rmm-paper", "aircraft", [9.4948, 5.5473, 0.491342, 361.2]),
@@ -41,7 +41,7 @@ pub const PUBLISHED: [PublishedRow; 16] = [
     row("mem-rbpf-paper", "aircraft", [6.3971, 21.0381, 0.523381, 292.3]),
     row("lstm", "aircraft", [481.3142, 15.2947, 0.003592, 463_391.9]),
     row("transformer", "aircraft", [353.9528, 10.4817, 0.009948, 250_590.8]),
-    row("rmmnet", "aircraft", [6.4819, 3.2714, 0.557263, 263.9]),
+    row("rmmnet-paper", "aircraft", [6.4819, 3.2714, 0.557263, 263.9]),
 ];
 
 impl PublishedRow {

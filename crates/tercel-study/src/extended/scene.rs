@@ -109,6 +109,24 @@ impl Aircraft {
         Aircraft::read(path, Heading::Course, false)
     }
 
+    /// The same tracks with velocities that are means over seven steps, three to either side, and the positions to which they
+    /// lead: without the unevenness of the recording.
+    pub fn evened(mut self) -> Self {
+        const SIDE: usize = 3;
+        for track in &mut self.tracks {
+            let old = track.clone();
+            for step in 0..old.len() {
+                let around = &old[step.saturating_sub(SIDE)..(step + SIDE + 1).min(old.len())];
+                let velocity =
+                    around.iter().map(|state| state.zw()).sum::<Vector2<f64>>() / around.len() as f64;
+                let before =
+                    if step > 0 { track[step - 1].xy() + velocity * self.interval } else { old[0].xy() };
+                track[step] = Vector4::new(before.x, before.y, velocity.x, velocity.y);
+            }
+        }
+        self
+    }
+
     /// The states `x, y, vx, vy` of each track, in m and m/s.
     pub fn tracks(&self) -> &[Vec<Vector4<f64>>] {
         &self.tracks

@@ -43,6 +43,8 @@ pub(crate) struct Settings {
     pub weights: f64,
     /// The model of the learned filter.
     pub rmmnet: &'static str,
+    /// The model of its form in the publication.
+    pub rmmnet_paper: &'static str,
     /// What the publication says.
     pub paper: PaperSettings,
 }
@@ -146,6 +148,7 @@ impl Settings {
         residual: 1.15,
         weights: 0.25,
         rmmnet: "rmmnet-vehicle",
+        rmmnet_paper: "rmmnet-vehicle-paper",
         paper: VEHICLE_PAPER,
     };
 
@@ -198,6 +201,7 @@ impl Settings {
         residual: 8.5,
         weights: 0.05,
         rmmnet: "rmmnet-aircraft",
+        rmmnet_paper: "rmmnet-aircraft-paper",
         paper: AIRCRAFT_PAPER,
     };
 

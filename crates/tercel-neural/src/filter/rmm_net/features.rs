@@ -27,7 +27,7 @@ pub(super) fn motion_seen(order: usize) -> usize {
 pub(super) const SCAN_SEEN: usize = 27;
 
 /// Numbers that are seen of an extent.
-pub(super) const EXTENT_SEEN: usize = 10;
+pub const EXTENT_SEEN: usize = 10;
 
 /// Logarithm of a deviation in units, held within reason.
 fn ln_deviation(variance: f64, unit: f64) -> f64 {

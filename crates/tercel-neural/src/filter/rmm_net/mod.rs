@@ -29,7 +29,7 @@ use belief::gaussian;
 use network::Layers;
 
 pub use belief::RmmNetBelief;
-pub use features::{Before, heading};
+pub use features::{Before, EXTENT_SEEN, heading};
 pub use hyper::{Aligned, Form, RmmNetHyper, Sizes};
 pub use kinematics::{Kinematics, begin};
 pub use network::RmmNetwork;

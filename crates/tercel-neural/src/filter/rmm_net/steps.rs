@@ -20,8 +20,12 @@ const FASTEST: f64 = 1e3;
 /// Most numbers that a head says.
 const MOST: usize = MOTION + LONGEST;
 
-fn finite(values: &[f32]) -> bool {
-    values.iter().all(|value| value.is_finite())
+/// Size beyond which nothing sensible is said.
+const LOUDEST: f32 = 1e4;
+
+/// Whether numbers can be heard: they are finite, and not as large as those of a network that overflows.
+fn sensible(values: &[f32]) -> bool {
+    values.iter().all(|value| value.abs() < LOUDEST)
 }
 
 /// What was said in double precision, or nothing where it is not to be heard.
@@ -45,7 +49,8 @@ impl AlignedLayers {
         let (seen, said) = (room.take(sizes.motion_seen), room.take(sizes.motion_said));
         options.see_motion(&before, &known, seen);
         self.say_motion(seen, next, room.0, said);
-        let sound = finite(said) && finite(next) && velocity[0].hypot(velocity[1]) < FASTEST * options.speed;
+        let sound =
+            sensible(said) && sensible(next) && velocity[0].hypot(velocity[1]) < FASTEST * options.speed;
         let said = &heard(said, sound)[..sizes.motion_said];
         if sound {
             belief.memory.commit();
@@ -88,11 +93,11 @@ impl AlignedLayers {
         let said_extent = room.take(sizes.extent_said);
         options.see_scan(&prior, &view, seen);
         self.say_scan((rows, count), seen, memory, room.0, (hidden, said));
-        let sound = finite(said) && finite(hidden);
+        let sound = sensible(said) && sensible(hidden);
         let mut after = prior.update(options, &view, &heard(said, sound)[..sizes.scan_said]);
         options.see_extent(&after, &view, seen_extent);
         self.say_extent(hidden, seen_extent, room.0, said_extent);
-        let said = heard(said_extent, finite(said_extent));
+        let said = heard(said_extent, sensible(said_extent));
         let report = after.settle_extent(options, &view, &said[..sizes.extent_said]);
         let mut state = gaussian(&after.motion);
         state.settle()?;
@@ -137,7 +142,7 @@ impl PublishedLayers {
         let (seen, said) = (room.take(ESTIMATE_SEEN), room.take(PREDICTED));
         self.options.see_estimate(&before, seen);
         self.say_prediction(seen, next, room.0, said);
-        let sound = finite(said) && finite(next);
+        let sound = sensible(said) && sensible(next);
         let said = &heard(said, sound)[..PREDICTED];
         if sound {
             belief.memory.commit();
@@ -163,7 +168,7 @@ impl PublishedLayers {
         let (seen, said) = (room.take(SCAN_SEEN), room.take(SAID[3]));
         self.options.see_scan(&prior, &moments, seen);
         self.say_update(seen, memory, room.0, said);
-        let after = prior.update(&self.options, &moments, &heard(said, finite(said))[..SAID[3]]);
+        let after = prior.update(&self.options, &moments, &heard(said, sensible(said))[..SAID[3]]);
         let mut state = gaussian(&after.motion);
         state.settle()?;
         belief.take_extent(&after)?;

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use tercel_core::extended::Points;
 
+use super::features::heading;
 use super::hyper::Aligned;
 use super::number::Symmetric;
 use super::track::Track;
@@ -84,7 +85,10 @@ impl View {
         let course = expected(options, prior, held);
         let double = [0, 1].map(|i| concentration[i] + course[i]);
         let angle = 0.5 * double[1].atan2(double[0]);
-        let axis = [angle.cos(), angle.sin()];
+        // An ellipse has no front; the frame has that of the course.
+        let front = heading(options, prior.motion.velocity, held);
+        let sign = if front[0] * angle.cos() + front[1] * angle.sin() < 0.0 { -1.0 } else { 1.0 };
+        let axis = [sign * angle.cos(), sign * angle.sin()];
         // The frame of the object: turned back by the angle.
         let within = |matrix: &Symmetric<f64>| matrix.turned([axis[0], -axis[1]]);
         let (own, around) = (within(&noise), within(&scatter));

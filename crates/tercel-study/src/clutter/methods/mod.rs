@@ -7,7 +7,7 @@
 //! | `gm` | one straight motion |
 //! | `imm` | ours: straight, turns at ±5 and ±10 °/s, agile |
 //! | `imm..-paper` | the three modes of the publication with its transitions and noises, the acceleration known |
-//! | `lnn`, `cfc` | motion learned by a liquid network: [`LiquidKalman`](tercel_neural::filter::LiquidKalman) with time constants, and in closed form |
+//! | `lnn` | motion learned by a liquid network: [`LiquidKalman`](tercel_neural::filter::LiquidKalman) |
 //! | `lnn..-paper` | the same as published: no memory, fixed noise |
 //! | `gru`, `mlp` | controls of the same size: gated units, and no memory |
 //! | `lnn-imm` | the modes of `imm` and the learned motion as one more |
@@ -37,13 +37,12 @@ use tercel_neural::shipped::Models;
 use crate::error::StudyError;
 
 /// Names of all methods, in the order in which they are best read.
-pub const METHODS: [&str; 28] = [
+pub const METHODS: [&str; 27] = [
     "gm-phd",
     "imm-phd-paper",
     "lnn-phd-paper",
     "imm-phd",
     "lnn-phd",
-    "cfc-phd",
     "gru-phd",
     "mlp-phd",
     "lnn-imm-phd",
@@ -85,7 +84,6 @@ pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError
         "lnn-phd-paper" => Box::new(Tracked::new(liquid("liquid-paper")?, phd)),
         "imm-phd" => Box::new(Tracked::new(bank, phd)),
         "lnn-phd" => Box::new(Tracked::new(liquid("liquid")?, phd)),
-        "cfc-phd" => Box::new(Tracked::new(liquid("liquid-cfc")?, phd)),
         "gru-phd" => Box::new(Tracked::new(liquid("liquid-gru")?, phd)),
         "mlp-phd" => Box::new(Tracked::new(liquid("liquid-mlp")?, phd)),
         "lnn-imm-phd" => Box::new(Tracked::new(liquid_bank()?, phd)),

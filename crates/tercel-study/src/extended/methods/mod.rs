@@ -10,6 +10,7 @@
 //! | `imm-rmm`, `imm-rmm-paper` | | the same in four interacting modes: straight, accelerating, turning left and right |
 //! | `mem-ekf`, `mem-ekf-paper` | | multiplicative error, linearised (Yang and Baum) |
 //! | `mem-rbpf`, `mem-rbpf-paper` | | multiplicative error with particles of the angle (Steuernagel and Baum) |
+//! | `rmmnet-paper` | | RMMNet as published |
 //! | `rmmnet` | | random matrix with a learned memory, which also sees the points themselves |
 //! | `known-size` | the size | the angle of the scan's greatest likelihood; for aircraft that of the course |
 //! | `aligned` | the size | the angle of velocity and scan together |
@@ -31,7 +32,7 @@ use super::{Method, Recording, StepEstimate};
 use crate::error::StudyError;
 
 /// Names of all methods of the study `vehicle`, in the order in which they are best read.
-pub const VEHICLE_METHODS: [&str; 19] = [
+pub const VEHICLE_METHODS: [&str; 20] = [
     "centroid",
     "b-rmm-paper",
     "vb-rmm-paper",
@@ -39,6 +40,7 @@ pub const VEHICLE_METHODS: [&str; 19] = [
     "imm-rmm-paper",
     "mem-ekf-paper",
     "mem-rbpf-paper",
+    "rmmnet-paper",
     "b-rmm",
     "ffk-rmm",
     "vb-rmm",
@@ -54,7 +56,7 @@ pub const VEHICLE_METHODS: [&str; 19] = [
 ];
 
 /// Names of all methods of the study `aircraft`: nobody knows the true motion there.
-pub const AIRCRAFT_METHODS: &[&str] = VEHICLE_METHODS.split_at(18).0;
+pub const AIRCRAFT_METHODS: &[&str] = VEHICLE_METHODS.split_at(19).0;
 
 /// The method of that name, with these numbers.
 ///
@@ -82,6 +84,7 @@ pub(crate) fn method(
         "mem-ekf-paper" => Box::new(shape::Linearised { settings, paper: true }),
         "mem-rbpf" => Box::new(shape::Sampled { settings, paper: false }),
         "mem-rbpf-paper" => Box::new(shape::Sampled { settings, paper: true }),
+        "rmmnet-paper" => Box::new(learned::Remembering::new(models, settings.rmmnet_paper)?),
         "rmmnet" => Box::new(learned::Remembering::new(models, settings.rmmnet)?),
         "known-size" => Box::new(known::Sized(settings)),
         "aligned" => Box::new(known::Straight(settings)),

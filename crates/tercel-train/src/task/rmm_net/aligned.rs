@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
-use tercel_core::extended::Scattering;
-use tercel_neural::filter::rmm_net::{Aligned, Before, Length, Past, Regression, Track, View, heading};
+use tercel_core::extended::{Points, Scattering};
+use tercel_neural::filter::rmm_net::{
+    Aligned, Before, EXTENT_SEEN, Length, Past, Regression, Track, View, heading,
+};
 
 use super::State;
 use super::data::Rides;
 use super::head::Head;
 use super::operations::{Given, Pool, Step};
-use super::rows::{STEP, TRACK, numbers, plain};
+use super::rows::{STEP, TRACK, numbers, plain, wide};
 use crate::backend::{Tensor, apply, constant, values};
 use crate::layer::{Activation, Linear, Lstm, LstmState};
 use crate::{ParameterSet, TrainError, Weights};
@@ -82,100 +84,115 @@ impl AlignedNet {
 
     /// One step of the batch: the state after it, and its row for the costs.
     pub fn step(&self, weights: &Weights, rides: &Rides, state: State, step: usize) -> (State, Tensor) {
-        let (options, members, sizes) = (&self.options, rides.members, self.options.sizes());
+        let (members, scans) = (rides.members, &rides.scans[step]);
         let State { tracks, memory, mut known } = state;
         let before: Vec<Track<f64>> = values(&tracks).chunks_exact(TRACK).map(plain).collect();
-        let mut seen = vec![0.0; members * sizes.motion_seen];
-        for ((track, known), row) in
-            before.iter().zip(&mut known).zip(seen.chunks_exact_mut(sizes.motion_seen))
-        {
-            known.regression.take(
-                &options.identification,
-                options.change,
-                track.motion.velocity,
-                known.measured,
-            );
-            options.see_motion(track, &known.before(), row);
-        }
-        let seen = constant(seen, [members, sizes.motion_seen]);
+        let seen = self.see_motion(&before, &mut known);
         let memory = self.memory.step(weights, seen.clone(), memory);
         let (_, motion) = self.motion.say(weights, vec![memory.hidden.clone(), seen]);
+        let Predicted { priors, given, points, moments } =
+            self.predict(&before, &known, &wide(&motion), scans);
+        let pooled = self.encode(weights, points, scans.iter().map(Points::count).collect());
+        let (hidden, scan) = self.scan.say(weights, vec![pooled, moments, memory.hidden.clone()]);
+        let extents = self.see_extents(&priors, &given, &wide(&scan));
+        let (_, extent) = self.extent.say(weights, vec![hidden, constant(extents, [members, EXTENT_SEEN])]);
+        let (options, given) = (Arc::clone(&self.options), Arc::new(given));
+        let operation = Step { options, length: self.length, given };
+        let row = apply(operation, [tracks, motion, scan, extent]);
+        for ((known, prior), (row, scan)) in
+            known.iter_mut().zip(&priors).zip(values(&row).chunks_exact(STEP).zip(scans))
+        {
+            known.go_on(prior, row, !scan.is_empty());
+        }
+        (State { tracks: row.clone().narrow(1, 0, TRACK), memory, known }, row)
+    }
 
-        let said = values(&motion);
-        let said: Vec<Vec<f64>> = said
-            .chunks_exact(sizes.motion_said)
-            .map(|row| row.iter().map(|x| f64::from(*x)).collect())
-            .collect();
-        let mut given = Vec::with_capacity(members);
-        let mut priors = Vec::with_capacity(members);
-        let counts: Vec<usize> = rides.scans[step].iter().map(|scan| scan.count()).collect();
-        let total: usize = counts.iter().sum();
+    /// What the memory sees of all members, which have learned from the velocity after the last step.
+    fn see_motion(&self, before: &[Track<f64>], known: &mut [Known]) -> Tensor {
+        let (options, width) = (&self.options, self.options.sizes().motion_seen);
+        let mut seen = vec![0.0; before.len() * width];
+        for ((track, known), row) in before.iter().zip(known).zip(seen.chunks_exact_mut(width)) {
+            let (identification, velocity) = (&options.identification, track.motion.velocity);
+            known.regression.take(identification, options.change, velocity, known.measured);
+            options.see_motion(track, &known.before(), row);
+        }
+        constant(seen, [before.len(), width])
+    }
+
+    /// The predictions, and what is seen of the scans in their frames.
+    fn predict(
+        &self,
+        before: &[Track<f64>],
+        known: &[Known],
+        said: &[Vec<f64>],
+        scans: &[Points],
+    ) -> Predicted {
+        let (options, sizes) = (&self.options, self.options.sizes());
+        let noise = (self.scattering.scale(), &self.scattering.noise());
+        let total: usize = scans.iter().map(Points::count).sum();
+        // Without any point there is a row of zeros that no member takes.
         let mut rows = vec![0.0; total.max(1) * sizes.point];
-        let mut scans = vec![0.0; members * sizes.scan_seen];
-        let mut next = 0;
-        for member in 0..members {
-            let (known, points) = (&known[member], &rides.scans[step][member]);
-            let axis = heading(options, before[member].motion.velocity, known.angle);
-            let velocities = known.regression.past().to_vec();
-            let expected = known.regression.expected();
+        let mut moments = vec![0.0; scans.len() * sizes.scan_seen];
+        let (mut priors, mut given, mut rest) = (Vec::new(), Vec::new(), rows.as_mut_slice());
+        for (member, row) in moments.chunks_exact_mut(sizes.scan_seen).enumerate() {
+            let (before, known, points) = (&before[member], &known[member], &scans[member]);
+            let axis = heading(options, before.motion.velocity, known.angle);
+            let (velocities, expected) = (known.regression.past().to_vec(), known.regression.expected());
             let past = Past { heading: axis, velocities: &velocities, expected };
-            let prior = before[member].predict(options, &past, &said[member], self.length);
-            let noise = (self.scattering.scale(), &self.scattering.noise());
+            let prior = before.predict(options, &past, &said[member], self.length);
             let view = (!points.is_empty()).then(|| View::new(options, &prior, known.angle, points, noise));
             if let Some(view) = &view {
-                view.see_points(
-                    &prior,
-                    points,
-                    &mut rows[next * sizes.point..][..points.count() * sizes.point],
-                );
-                options.see_scan(&prior, view, &mut scans[member * sizes.scan_seen..][..sizes.scan_seen]);
-                next += points.count();
+                let (own, others) = rest.split_at_mut(points.count() * sizes.point);
+                view.see_points(&prior, points, own);
+                options.see_scan(&prior, view, row);
+                rest = others;
             }
             priors.push(prior);
             given.push(Given { heading: axis, velocities, expected, held: known.angle, view });
         }
-        let rows = constant(rows, [total.max(1), sizes.point]);
-        let rows = self.points[0].forward(weights, rows);
-        let rows = self.points[1].forward(weights, rows);
-        let pooled = apply(Pool { counts: Arc::new(counts) }, [rows]);
-        let scans = constant(scans, [members, sizes.scan_seen]);
-        let (hidden, scan) = self.scan.say(weights, vec![pooled, scans, memory.hidden.clone()]);
+        let points = constant(rows, [total.max(1), sizes.point]);
+        Predicted { priors, given, points, moments: constant(moments, [scans.len(), sizes.scan_seen]) }
+    }
 
-        let said = values(&scan);
-        let mut extents = vec![0.0; members * sizes.extent_seen];
-        for member in 0..members {
+    /// What the encoder makes of the points of each member.
+    fn encode(&self, weights: &Weights, points: Tensor, counts: Vec<usize>) -> Tensor {
+        let points = self.points[0].forward(weights, points);
+        let points = self.points[1].forward(weights, points);
+        apply(Pool { counts: Arc::new(counts) }, [points])
+    }
+
+    /// What is seen of the extents after the updates; zeros where there was none.
+    fn see_extents(&self, priors: &[Track<f64>], given: &[Given], said: &[Vec<f64>]) -> Vec<f32> {
+        let mut seen = vec![0.0; priors.len() * EXTENT_SEEN];
+        for (member, row) in seen.chunks_exact_mut(EXTENT_SEEN).enumerate() {
             if let Some(view) = &given[member].view {
-                let said: Vec<f64> = said[member * sizes.scan_said..][..sizes.scan_said]
-                    .iter()
-                    .map(|x| f64::from(*x))
-                    .collect();
-                let after = priors[member].update(options, view, &said);
-                options.see_extent(
-                    &after,
-                    view,
-                    &mut extents[member * sizes.extent_seen..][..sizes.extent_seen],
-                );
+                let after = priors[member].update(&self.options, view, &said[member]);
+                self.options.see_extent(&after, view, row);
             }
         }
-        let extents = constant(extents, [members, sizes.extent_seen]);
-        let (_, extent) = self.extent.say(weights, vec![hidden, extents]);
-        let measured: Vec<bool> = given.iter().map(|given| given.view.is_some()).collect();
-        let operation = Step { options: Arc::clone(options), length: self.length, given: Arc::new(given) };
-        let row = apply(operation, [tracks, motion, scan, extent]);
-        for (((known, prior), measured), row) in
-            known.iter_mut().zip(&priors).zip(measured).zip(values(&row).chunks_exact(STEP))
-        {
-            known.angle = f64::from(row[TRACK]);
-            let prior = prior.motion.numbers();
-            known.correction =
-                std::array::from_fn(|i| if measured { f64::from(row[i]) - prior[i] } else { 0.0 });
-            known.measured = measured;
-        }
-        (State { tracks: row.clone().narrow(1, 0, TRACK), memory, known }, row)
+        seen
     }
 }
 
+/// Predictions of a batch.
+struct Predicted {
+    priors: Vec<Track<f64>>,
+    given: Vec<Given>,
+    /// Points of all members, as the encoder sees them.
+    points: Tensor,
+    /// What is seen of each scan besides.
+    moments: Tensor,
+}
+
 impl Known {
+    /// After a step from this prediction to this row.
+    fn go_on(&mut self, prior: &Track<f64>, row: &[f32], measured: bool) {
+        let prior = prior.motion.numbers();
+        self.angle = f64::from(row[TRACK]);
+        self.correction = std::array::from_fn(|i| if measured { f64::from(row[i]) - prior[i] } else { 0.0 });
+        self.measured = measured;
+    }
+
     fn before(&self) -> Before<'_> {
         Before {
             angle: self.angle,

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use tercel_core::extended::Scattering;
+use tercel_core::extended::{Points, Scattering};
 use tercel_neural::filter::rmm_net::{Extended, Moments, Published, widths};
 
 use super::State;
 use super::data::Rides;
 use super::head::Head;
 use super::operations::PublishedStep;
-use super::rows::{EXTENDED, extended, extended_numbers};
-use crate::backend::{Tensor, apply, constant, values};
+use super::rows::{EXTENDED, extended, extended_numbers, wide};
+use crate::backend::{Tensor, apply, constant};
 use crate::layer::{Lstm, LstmState};
 use crate::{ParameterSet, TrainError, Weights};
 
@@ -81,11 +81,7 @@ impl PublishedNet {
     pub fn step(&self, weights: &Weights, rides: &Rides, state: State, step: usize) -> (State, Tensor) {
         let (options, members) = (&self.options, rides.members);
         let State { tracks, mut memory, known } = state;
-        let wide = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect::<Vec<_>>();
-        let rows_of = |tensor: &Tensor, width: usize| -> Vec<Vec<f64>> {
-            values(tensor).chunks_exact(width).map(wide).collect()
-        };
-        let before: Vec<Extended<f64>> = rows_of(&tracks, EXTENDED).iter().map(|row| extended(row)).collect();
+        let before: Vec<Extended<f64>> = wide(&tracks).iter().map(|row| extended(row)).collect();
         let mut seen = vec![0.0; members * widths::ESTIMATE_SEEN];
         for (estimate, row) in before.iter().zip(seen.chunks_exact_mut(widths::ESTIMATE_SEEN)) {
             options.see_estimate(estimate, row);
@@ -105,19 +101,7 @@ impl PublishedNet {
             }
             None => constant(vec![0.0; members * widths::PREDICTED], [members, widths::PREDICTED]),
         };
-        let mut scans = vec![0.0; members * widths::SCAN_SEEN];
-        let mut moments = Vec::with_capacity(members);
-        let said = rows_of(&prediction, widths::PREDICTED);
-        for (member, row) in scans.chunks_exact_mut(widths::SCAN_SEEN).enumerate() {
-            let points = &rides.scans[step][member];
-            let noise = self.scattering.noise();
-            let own = (!points.is_empty()).then(|| Moments::new(points, self.scattering.scale(), &noise));
-            if let Some(own) = &own {
-                let prior = before[member].predict(options, &said[member], self.dt);
-                options.see_scan(&prior, own, row);
-            }
-            moments.push(own);
-        }
+        let (moments, scans) = self.see_scans(&before, &wide(&prediction), &rides.scans[step]);
         let scan = match &self.update {
             Some(head) => head.say(weights, vec![constant(scans, [members, widths::SCAN_SEEN]), context]).1,
             None => constant(vec![0.0; members * widths::SAID[3]], [members, widths::SAID[3]]),
@@ -125,5 +109,27 @@ impl PublishedNet {
         let operation = PublishedStep { options: Arc::clone(options), dt: self.dt, seen: Arc::new(moments) };
         let row = apply(operation, [tracks, prediction, scan]);
         (State { tracks: row.clone(), memory, known }, row)
+    }
+
+    /// The moments of scans with points, and what is seen of them.
+    fn see_scans(
+        &self,
+        before: &[Extended<f64>],
+        said: &[Vec<f64>],
+        scans: &[Points],
+    ) -> (Vec<Option<Moments>>, Vec<f32>) {
+        let (scale, noise) = (self.scattering.scale(), self.scattering.noise());
+        let mut rows = vec![0.0; scans.len() * widths::SCAN_SEEN];
+        let mut moments = Vec::with_capacity(scans.len());
+        for (member, row) in rows.chunks_exact_mut(widths::SCAN_SEEN).enumerate() {
+            let points = &scans[member];
+            let own = (!points.is_empty()).then(|| Moments::new(points, scale, &noise));
+            if let Some(own) = &own {
+                let prior = before[member].predict(&self.options, &said[member], self.dt);
+                self.options.see_scan(&prior, own, row);
+            }
+            moments.push(own);
+        }
+        (moments, rows)
     }
 }

@@ -2,6 +2,8 @@
 
 use tercel_neural::filter::rmm_net::{Extended, Kinematics, Number, Report, Symmetric, Track};
 
+use crate::backend::{Tensor, values};
+
 /// Numbers of a Gaussian.
 pub const MOTION: usize = 14;
 
@@ -28,6 +30,13 @@ pub fn track<T: Number>(row: &[T]) -> Track<T> {
 pub fn plain(row: &[f32]) -> Track<f64> {
     let row: [f64; TRACK] = std::array::from_fn(|i| f64::from(row[i]));
     track(&row)
+}
+
+/// The rows of a tensor in double precision.
+pub fn wide(tensor: &Tensor) -> Vec<Vec<f64>> {
+    let [_, width] = tensor.dims();
+    let row = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect();
+    values(tensor).chunks_exact(width).map(row).collect()
 }
 
 /// What a step gives, in the order of a row.
