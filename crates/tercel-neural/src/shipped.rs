@@ -46,8 +46,10 @@ const FILES: &[(&str, &[u8])] = files![
     "neural-imm",
     "neural-imm-position",
     "rmmnet-aircraft",
+    "rmmnet-aircraft-paper",
     "rmmnet-crossing",
     "rmmnet-vehicle",
+    "rmmnet-vehicle-paper",
     "tr-mtt",
 ];
 

@@ -145,7 +145,11 @@ fn agree(task: &RmmNetTask, set: &ParameterSet, steps: usize) {
                 // Relative to the length of the vector: its direction is anybody's.
                 let pair = i / 2 * 2;
                 let scale = ran.mean[pair].hypot(ran.mean[pair + 1]).max(10.0) + ran.deviations()[i];
-                assert!(error < 1e-4 * scale, "step {step}, member {member}, {i}: {error}");
+                // The training keeps positions in single precision: far from the origin they have steps, over which
+                // velocities are found.
+                let step_of_positions = f64::from(f32::EPSILON) * ran.mean[0].hypot(ran.mean[1]);
+                let allowed = 1e-4 * scale + 8.0 * step_of_positions;
+                assert!(error < allowed, "step {step}, member {member}, {i}: {error}");
             }
             let off = (trained.covariance - ran.covariance).norm() / ran.covariance.norm();
             assert!(off < 1e-3, "step {step}, member {member}: {off}");
