@@ -81,7 +81,7 @@ fn a_choice_of_measurements_gives_the_merger_of_the_updates() {
 #[test]
 fn measurements_of_their_own_noise_and_across_the_cut_are_no_special_case() {
     let before = [[800.0, 3.13], [801.0, 3.135]];
-    let seen = [[803.0, 3.138], [800.0, -3.139], [799.0, 3.141], [806.0, -3.13]].map(Measurement::from);
+    let seen = [[803.0, 3.138], [800.0, -3.139], [799.0, 3.135], [806.0, -3.13]].map(Measurement::from);
     let motion = ConstantVelocity::new(0.5).with_speed(10.0);
     at_once_is_one_by_one::<4, _>(
         &Extended::new(motion, RangeBearing::new(5.0, 0.01).unwrap()),

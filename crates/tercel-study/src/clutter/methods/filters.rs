@@ -75,10 +75,13 @@ pub(super) fn neural(
     Ok(move |sensor: &Sensor| NeuralImm::new(network.clone(), &[Position::new(sensor.deviation)?]))
 }
 
+/// A bank of turns alone.
+type Turns = Imm<Extended<Turn, Position<2>>>;
+
 /// The bank of [`neural`] without its network, which tells what the network adds.
 pub(super) fn wide(
     models: &Models,
-) -> Result<impl Fn(&Sensor) -> Result<Imm<Extended<Turn, Position<2>>>, FilterError> + use<>, StudyError> {
+) -> Result<impl Fn(&Sensor) -> Result<Turns, FilterError> + use<>, StudyError> {
     let bank = BankNetwork::from_model(&models.get("neural-imm-position")?)?.hyper().bank()?;
     Ok(move |sensor: &Sensor| bank.filter(Position::new(sensor.deviation)?))
 }
