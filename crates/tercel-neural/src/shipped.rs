@@ -1,5 +1,7 @@
 //! The models that come with Tercel.
 
+use std::collections::BTreeMap;
+
 use crate::error::ModelError;
 use crate::model::Model;
 
@@ -36,8 +38,13 @@ const FILES: &[(&str, &[u8])] = files![
     "kalman-net-right-paper",
     "kalman-net-straight",
     "kalman-net-straight-paper",
+    "liquid",
+    "liquid-gru",
+    "liquid-mlp",
+    "liquid-paper",
     "mnemonic",
     "neural-imm",
+    "neural-imm-position",
     "rmmnet-aircraft",
     "rmmnet-aircraft-paper",
     "rmmnet-crossing",
@@ -71,6 +78,51 @@ pub fn model(name: &str) -> Result<Model, ModelError> {
     }
 }
 
+/// The models that come with Tercel, of which some are replaced by others: how a model of one's own is put where a shipped one
+/// is used.
+///
+/// ```
+/// use tercel_neural::shipped::{self, Models};
+///
+/// let mine = shipped::model("neural-imm")?; // or `Model::open`
+/// let models = Models::default().with("neural-imm", mine)?;
+/// assert_eq!(models.get("neural-imm")?.card().kind, "neural-imm");
+/// # Ok::<(), tercel_neural::ModelError>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Models {
+    own: BTreeMap<String, Model>,
+}
+
+impl Models {
+    /// Puts a model in the place of the shipped one of this name.
+    ///
+    /// # Errors
+    /// When there is no shipped model of this name, or it is of another kind.
+    pub fn with(mut self, name: &str, own: Model) -> Result<Self, ModelError> {
+        let kind = model(name)?.card().kind.clone();
+        if own.card().kind != kind {
+            let (file, found) = (own.file().clone(), own.card().kind.clone());
+            return Err(ModelError::Kind { file, found, expected: kind });
+        }
+        self.own.insert(name.to_owned(), own);
+        Ok(self)
+    }
+
+    /// The models that take the place of shipped ones, by the names of those.
+    pub fn replacements(&self) -> impl Iterator<Item = (&str, &Model)> {
+        self.own.iter().map(|(name, model)| (name.as_str(), model))
+    }
+
+    /// The model of this name.
+    ///
+    /// # Errors
+    /// As [`model`].
+    pub fn get(&self, name: &str) -> Result<Model, ModelError> {
+        self.own.get(name).map_or_else(|| model(name), |own| Ok(own.clone()))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,6 +135,14 @@ mod tests {
             filter::check(&model).unwrap();
             assert_eq!(model.card().name, name);
         }
+    }
+
+    #[test]
+    fn a_model_of_another_kind_replaces_nothing() {
+        let own = || model("mnemonic").unwrap();
+        let error = Models::default().with("neural-imm", own()).unwrap_err().to_string();
+        assert!(error.contains("mnemonic") && error.contains("neural-imm"), "{error}");
+        assert!(Models::default().with("mine", own()).is_err());
     }
 
     #[test]

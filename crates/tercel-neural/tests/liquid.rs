@@ -9,12 +9,13 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix4, Vector2, Vector4};
 use tercel_core::belief::Gaussian;
-use tercel_core::filter::{Extended, Filter};
+use tercel_core::filter::{Extended, Filter, Particle};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::multi::{Clutter, Detection, Phd, PhdConfig, Scan, Status, Tracker};
 use tercel_core::sensor::{Measurement, Position};
 use tercel_neural::filter::{
-    Absolute, Derivative, Form, LiquidBelief, LiquidHyper, LiquidKalman, LiquidNetwork, Residual,
+    Absolute, Derivative, Form, LiquidBelief, LiquidHyper, LiquidKalman, LiquidMotion, LiquidNetwork,
+    Residual, surprise, widths,
 };
 use tercel_neural::layer::CellShape;
 use tercel_neural::{Card, Model, ModelError, Tensor};
@@ -368,4 +369,58 @@ fn impossible_options_are_refused_by_name() {
     kind.kind = "mnemonic".into();
     let kind = Model::new(kind, BTreeMap::new()).unwrap();
     assert!(matches!(LiquidNetwork::from_model(&kind), Err(ModelError::Kind { .. })));
+}
+
+#[test]
+fn the_surprise_is_the_normalised_innovation_whatever_turns() {
+    let filter = Extended::new(ConstantVelocity::new(0.5), Position::<2>::new(5.0).unwrap());
+    let mut belief: Gaussian<4> = filter.birth(&[0.0, 0.0].into()).unwrap();
+    for step in 1..20 {
+        filter.predict(&mut belief, 1.0);
+        let before = belief;
+        let place = [10.0 * f64::from(step) + f64::from(step * 7 % 11), f64::from(step * 5 % 7)];
+        let innovation = filter.update(&mut belief, &place.into()).unwrap();
+        let nis = surprise(&before, &belief).norm_squared();
+        assert!((nis - innovation.nis).abs() < 1e-6 * (1.0 + nis), "{nis} {}", innovation.nis);
+        assert!(widths(&belief)[0] < widths(&before)[0]);
+    }
+    assert_eq!(surprise(&belief, &belief), Vector2::zeros());
+}
+
+#[test]
+fn particles_move_as_the_network_says() {
+    for hyper in forms().into_iter().chain([paper_liquid()]) {
+        let network = liquid(&hyper, 1.0);
+        let radar = Position::new(5.0).unwrap();
+        let (gaussian, count) = (LiquidKalman::new(network.clone(), radar), 400);
+        let cloud = Particle::new(LiquidMotion::new(network), radar, count, 3).unwrap();
+        let start = seen(0, 0.3, Vector2::zeros()).unwrap();
+        let mut particles = cloud.birth(&start).unwrap();
+        let mut belief = gaussian.birth(&start).unwrap();
+        // While the motion is straight the mean of the cloud is that of the Gaussian, but for chance.
+        cloud.predict(&mut particles, 1.0);
+        gaussian.predict(&mut belief, 1.0);
+        let (ours, theirs) = (cloud.state(&particles), gaussian.state(&belief));
+        let off = ours.mean - theirs.mean;
+        if hyper.warm_up > 0 {
+            let chance = 5.0 * theirs.covariance.diagonal().max().sqrt() / f64::from(count as u32).sqrt();
+            assert!(off.amax() < chance, "{hyper:?}: {off} {chance}");
+        }
+        for step in 1..25 {
+            cloud.predict(&mut particles, if step == 20 { 0.0 } else { 1.0 });
+            if let Some(seen) = seen(step, 0.3, Vector2::zeros()) {
+                // A cloud that has lost the object is told so, and stays finite.
+                let _ = cloud.update(&mut particles, &seen);
+            }
+            assert!(cloud.state(&particles).mean.iter().all(|value| value.is_finite()), "{hyper:?}");
+        }
+    }
+}
+
+#[test]
+fn the_speed_of_new_objects_is_the_users() {
+    let filter = filter(&small_liquid(CELLS[0]), 1.0).with_speed(7.0).unwrap();
+    let belief = filter.birth(&[0.0, 0.0].into()).unwrap();
+    assert!((filter.state(&belief).covariance[(2, 2)] - 49.0).abs() < 1e-9);
+    assert!(filter.with_speed(-1.0).is_err());
 }

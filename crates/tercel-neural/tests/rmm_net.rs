@@ -37,7 +37,7 @@ fn scan(step: u32) -> Vec<Vector2<f64>> {
     let mut random = ChaCha8Rng::seed_from_u64(u64::from(step));
     let count = if step % 7 == 6 { 0 } else { 5 + step as usize % 13 };
     let mut point = || {
-        let (radius, angle) = (random.random::<f64>().sqrt(), 6.28 * random.random::<f64>());
+        let (radius, angle) = (random.random::<f64>().sqrt(), std::f64::consts::TAU * random.random::<f64>());
         let noise = vector![random.random::<f64>() - 0.5, random.random::<f64>() - 0.5] * 6.0_f64.sqrt();
         centre
             + Rotation2::new(phase) * vector![6.0 * radius * angle.cos(), 1.25 * radius * angle.sin()]

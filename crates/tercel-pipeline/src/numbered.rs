@@ -36,6 +36,18 @@ impl<B: Clone, const N: usize, const M: usize> Filter<N> for Numbered<'_, B, N, 
         self.filter.innovation(belief, &self.measurements[*number])
     }
 
+    fn innovations(&self, belief: &B, numbers: &[&usize], found: &mut Vec<Result<Innovation, FilterError>>) {
+        let measurements: Vec<&Measurement<M>> =
+            numbers.iter().map(|number| &self.measurements[**number]).collect();
+        self.filter.innovations(belief, &measurements, found);
+    }
+
+    fn associate(&self, belief: &mut B, parts: &[(f64, &usize)], none: f64) -> f64 {
+        let parts: Vec<(f64, &Measurement<M>)> =
+            parts.iter().map(|(weight, number)| (*weight, &self.measurements[**number])).collect();
+        self.filter.associate(belief, &parts, none)
+    }
+
     fn state(&self, belief: &B) -> Gaussian<N> {
         self.filter.state(belief)
     }

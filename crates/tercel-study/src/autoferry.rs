@@ -1,5 +1,7 @@
 //! The study `autoferry`: real radar and lidar in a harbour against boats with satellite navigation.
 
+mod leave_one_out;
+
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
@@ -9,19 +11,18 @@ use tercel_data::table::{Detections, Metric, Metrics, Tracks, Truths};
 use tercel_data::{AtomicFile, ImportOptions, Source, import};
 use tercel_pipeline::config::presets;
 use tercel_pipeline::{Config, Pipeline};
-use toml::Table;
 
 use crate::error::StudyError;
 use crate::evaluate::{EvaluateOptions, Evaluation, evaluate};
 use crate::report::{Picture, Report, Summary};
 use crate::table::{Figure, Row, StudyTable};
-use crate::tune::{Knob, descend};
 
 /// Name of the study.
 pub const NAME: &str = "autoferry";
 
 /// What can be compared.
-pub const METHODS: [&str; 3] = ["nearest-neighbour", "phd", "nearest-neighbour-loo"];
+pub const METHODS: [&str; 5] =
+    ["nearest-neighbour", "phd", "imm-pmbm", "nearest-neighbour-loo", "imm-pmbm-loo"];
 
 /// The columns of the table.
 pub const COLUMNS: [&str; 11] = [
@@ -216,9 +217,9 @@ fn number_of(name: &str) -> u64 {
 
 /// Runs the study over the recordings of a folder.
 ///
-/// `nearest-neighbour` and `phd` use one shipped configuration for all recordings. `nearest-neighbour-loo` tunes that
-/// configuration anew for each recording on the others alone: how much of the result is fitted to these few scenes. `progress`
-/// is called with a sentence before each long step.
+/// `nearest-neighbour`, `phd` and `imm-pmbm` use one shipped configuration for all recordings. A name that ends in `-loo` tunes
+/// that configuration anew for each recording on the others alone: how much of the result is fitted to these few scenes.
+/// `progress` is called with a sentence before each long step.
 ///
 /// # Errors
 /// When a method is not known, or a recording cannot be read or tracked.
@@ -236,9 +237,9 @@ pub fn run(
     let mut scored = Vec::new();
     for method in methods {
         progress(&format!("{method} on {} recordings", recordings.len()));
-        let results: Result<Vec<Scored>, StudyError> = match method.as_str() {
-            "nearest-neighbour-loo" => leave_one_out(&recordings, progress),
-            method => {
+        let results: Result<Vec<Scored>, StudyError> = match leave_one_out::Tuned::find(method) {
+            Some(tuned) => tuned.leave_one_out(&recordings, progress),
+            None => {
                 let config = shipped(method)?;
                 recordings.iter().map(|recording| recording.score(&config)).collect()
             }
@@ -260,7 +261,11 @@ pub fn run(
 
 /// The shipped configuration of a method.
 fn shipped(method: &str) -> Result<Config, StudyError> {
-    let preset = if method == "phd" { "harbour-phd" } else { "harbour" };
+    let preset = match method {
+        "phd" => "harbour-phd",
+        "imm-pmbm" => "harbour-pmbm",
+        _ => "harbour",
+    };
     // The presets are part of the program, and a test reads each.
     Ok(Config::parse(presets::get(preset).unwrap_or_default())?)
 }
@@ -309,63 +314,6 @@ fn metrics(recordings: &[Recording], scored: &[(String, Vec<Scored>)]) -> Metric
     }
     Metrics { rows }
 }
-
-/// What tuning may change, in this order.
-const KNOBS: [Knob; 16] = [
-    Knob { key: "sensors.radar.measures.position.lag", values: &[1.0, 1.5, 1.8, 2.0, 2.2, 2.5, 2.8] },
-    Knob { key: "sensors.radar.measures.position.deviation", values: &[2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0] },
-    Knob { key: "motion.constant_velocity.acceleration_density", values: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8] },
-    Knob { key: "motion.constant_velocity.speed", values: &[3.0, 4.0, 5.0, 6.0, 8.0] },
-    Knob { key: "sensors.radar.detection", values: &[0.5, 0.6, 0.7, 0.8, 0.85, 0.9] },
-    Knob { key: "sensors.radar.clutter.map.background", values: &[1e-5, 2e-5, 5e-5, 1e-4, 2e-4] },
-    Knob { key: "sensors.radar.clutter.map.cell", values: &[10.0, 15.0, 20.0, 25.0, 30.0, 40.0] },
-    Knob { key: "sensors.radar.clutter.map.memory", values: &[20.0, 30.0, 50.0, 75.0, 100.0, 150.0] },
-    Knob { key: "sensors.lidar.measures.position.lag", values: &[0.0, 0.2, 0.4, 0.6, 0.8] },
-    Knob { key: "sensors.lidar.measures.position.deviation", values: &[1.5, 2.0, 2.5, 3.0, 4.0] },
-    Knob { key: "sensors.lidar.detection.0.1", values: &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6] },
-    Knob { key: "sensors.lidar.clutter.map.background", values: &[1e-6, 1e-5, 3e-5, 1e-4, 3e-4] },
-    Knob { key: "tracker.nearest_neighbour.merge", values: &[0.2, 0.5, 1.0, 2.0, 4.0, 8.0] },
-    Knob { key: "tracker.nearest_neighbour.birth", values: &[0.02, 0.05, 0.1, 0.2, 0.3] },
-    Knob {
-        key: "tracker.nearest_neighbour.management.confirm.existence",
-        values: &[0.95, 0.98, 0.99, 0.995, 0.999, 0.9995],
-    },
-    Knob {
-        key: "tracker.nearest_neighbour.management.min_existence",
-        values: &[0.003, 0.01, 0.02, 0.05, 0.1],
-    },
-];
-
-/// Scores each recording with the configuration that fits the others best, starting from plain defaults, not from the shipped
-/// configuration, which has seen all of them.
-fn leave_one_out(recordings: &[Recording], progress: &dyn Fn(&str)) -> Result<Vec<Scored>, StudyError> {
-    let start: Table =
-        START.parse().map_err(|error| tercel_pipeline::PipelineError::Syntax(Box::new(error)))?;
-    let mut results = Vec::new();
-    for (out, recording) in recordings.iter().enumerate() {
-        progress(&format!("tuning on all recordings but {}", recording.name));
-        let others = || recordings.iter().enumerate().filter(|&(number, _)| number != out);
-        let cost = |config: &Config| {
-            let scores = others().map(|(_, other)| Some(cost_of(&other.score(config).ok()?)));
-            let scores: Option<Vec<f64>> = scores.collect();
-            scores.map_or(f64::INFINITY, |scores| scores.iter().sum::<f64>() / scores.len() as f64)
-        };
-        let best = descend(&start, &KNOBS, 4, cost);
-        results.push(recording.score(&Config::parse(&best.to_string())?)?);
-    }
-    Ok(results)
-}
-
-/// What tuning minimises: both forms of GOSPA, lost objects and switches, in metres.
-fn cost_of(scored: &Scored) -> f64 {
-    let mean = |name| scored.evaluation.mean(name).unwrap_or(f64::NAN);
-    let cost =
-        0.5 * (mean("gospa") + mean("gospa_near")) + 50.0 * (1.0 - mean("covered")) + 3.0 * mean("switches");
-    if cost.is_finite() { cost } else { 1e3 }
-}
-
-/// Where tuning starts: numbers that the data sheets and a glance at the boats suggest.
-const START: &str = include_str!("autoferry/start.toml");
 
 #[cfg(test)]
 mod tests;

@@ -104,6 +104,7 @@ mod tests {
             methods: &methods,
             options: BTreeMap::new(),
             data: None,
+            models: &tercel_neural::shipped::Models::default(),
         };
         let experiment = ExtendedSceneExperiment::new(&request).unwrap();
         let attempts = experiment.run(0, 0);

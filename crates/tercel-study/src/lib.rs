@@ -21,6 +21,7 @@ pub mod evaluate;
 pub mod extended;
 pub mod extended_scene;
 pub mod monte_carlo;
+pub mod paris;
 pub mod report;
 pub mod studies;
 mod table;

@@ -3,6 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use tercel_neural::Model;
+use tercel_neural::shipped::Models;
+
 use crate::air_traffic::{self, AirTrafficExperiment};
 use crate::autoferry;
 use crate::clutter::{self, ClutterExperiment};
@@ -10,6 +13,7 @@ use crate::error::StudyError;
 use crate::extended::{self, ExtendedExperiment};
 use crate::extended_scene::{self, ExtendedSceneExperiment};
 use crate::monte_carlo::{Experiment, Plan};
+use crate::paris::{self, ParisExperiment};
 
 /// A study that can be run by its name.
 ///
@@ -93,6 +97,8 @@ pub struct Choice {
     pub options: BTreeMap<String, String>,
     /// File or folder of the data around which scenes are drawn.
     pub data: Option<PathBuf>,
+    /// Files of models that take the place of shipped ones, by the name of those.
+    pub models: BTreeMap<String, PathBuf>,
 }
 
 /// A choice that was made.
@@ -106,6 +112,8 @@ pub(crate) struct Request<'a> {
     /// The kinds of everything of which there are several.
     pub options: BTreeMap<String, String>,
     pub data: Option<&'a Path>,
+    /// The models of the learned methods.
+    pub models: &'a Models,
 }
 
 impl Request<'_> {
@@ -128,7 +136,7 @@ pub const STUDIES: [Study; 12] = [
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
         methods: &air_traffic::methods::METHODS,
         kind: Kind::MonteCarlo(MonteCarlo::new(air_traffic::SEED, 1000, |r| {
-            boxed(AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods))
+            boxed(AirTrafficExperiment::published("atc-test", r.seed, r.runs, r.methods, r.models))
         })),
     },
     Study {
@@ -136,7 +144,7 @@ pub const STUDIES: [Study; 12] = [
         about: "the same at high speed with hard turns (Table 5)",
         methods: &air_traffic::methods::METHODS,
         kind: Kind::MonteCarlo(MonteCarlo::new(air_traffic::SEED, 1000, |r| {
-            boxed(AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods))
+            boxed(AirTrafficExperiment::published("atc-hshm", r.seed, r.runs, r.methods, r.models))
         })),
     },
     Study {
@@ -146,7 +154,7 @@ pub const STUDIES: [Study; 12] = [
         kind: Kind::MonteCarlo(MonteCarlo {
             sets: &["test", "hshm"],
             ..MonteCarlo::new(air_traffic::SEED, 200, |r| {
-                boxed(AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods))
+                boxed(AirTrafficExperiment::noise(r.flights(), r.seed, r.runs, r.methods, r.models))
             })
         }),
     },
@@ -157,7 +165,7 @@ pub const STUDIES: [Study; 12] = [
         kind: Kind::MonteCarlo(MonteCarlo {
             sets: &["test", "hshm"],
             ..MonteCarlo::new(air_traffic::SEED, 200, |r| {
-                boxed(AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods))
+                boxed(AirTrafficExperiment::missing(r.flights(), r.seed, r.runs, r.methods, r.models))
             })
         }),
     },
@@ -166,7 +174,7 @@ pub const STUDIES: [Study; 12] = [
         about: "what the parts of the published ensemble are worth, on validation flights (Table 2)",
         methods: &air_traffic::methods::ABLATION,
         kind: Kind::MonteCarlo(MonteCarlo::new(air_traffic::SEED, 1000, |r| {
-            boxed(AirTrafficExperiment::ablation(r.seed, r.runs, r.methods))
+            boxed(AirTrafficExperiment::ablation(r.seed, r.runs, r.methods, r.models))
         })),
     },
     Study {
@@ -205,7 +213,7 @@ pub const STUDIES: [Study; 12] = [
         about: "nine objects in dense clutter, two of which manoeuvre (Figs. 2 and 3)",
         methods: &clutter::methods::METHODS,
         kind: Kind::MonteCarlo(MonteCarlo::new(clutter::SEED, 100, |r| {
-            boxed(ClutterExperiment::new("clutter-partial", r.seed, r.runs, r.methods))
+            boxed(ClutterExperiment::new("clutter-partial", r.seed, r.runs, r.methods, r.models))
         })),
     },
     Study {
@@ -213,7 +221,7 @@ pub const STUDIES: [Study; 12] = [
         about: "six objects in clutter that all manoeuvre at once (Figs. 4 and 5)",
         methods: &clutter::methods::METHODS,
         kind: Kind::MonteCarlo(MonteCarlo::new(clutter::SEED, 100, |r| {
-            boxed(ClutterExperiment::new("clutter-all", r.seed, r.runs, r.methods))
+            boxed(ClutterExperiment::new("clutter-all", r.seed, r.runs, r.methods, r.models))
         })),
     },
     Study {
@@ -221,8 +229,17 @@ pub const STUDIES: [Study; 12] = [
         about: "random scenes of 5 to 12 objects that come, go and manoeuvre in clutter",
         methods: &clutter::methods::METHODS,
         kind: Kind::MonteCarlo(MonteCarlo::new(clutter::SEED, 100, |r| {
-            boxed(ClutterExperiment::new("clutter-random", r.seed, r.runs, r.methods))
+            boxed(ClutterExperiment::new("clutter-random", r.seed, r.runs, r.methods, r.models))
         })),
+    },
+    Study {
+        name: "paris",
+        about: "aircraft around Paris as they flew, seen by a simulated radar in clutter",
+        methods: &paris::methods::METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            data: true,
+            ..MonteCarlo::new(paris::SEED, 17, |r| boxed(ParisExperiment::new(r)))
+        }),
     },
     Study {
         name: autoferry::NAME,
@@ -296,7 +313,8 @@ impl Study {
         }
         let seed = choice.seed.unwrap_or(study.seed);
         let chosen_runs = choice.runs.is_some();
-        let request = Request { set, seed, runs, chosen_runs, methods: &methods, options, data };
+        let models = &opened(&choice.models)?;
+        let request = Request { set, seed, runs, chosen_runs, methods: &methods, options, data, models };
         (study.build)(&request)
     }
 }
@@ -338,6 +356,23 @@ impl Study {
     }
 }
 
+/// What the name of a replaced model follows in the options of a plan.
+const MODEL: &str = "model ";
+
+/// What a plan says of the models that take the place of shipped ones.
+pub(crate) fn options_of(models: &Models) -> impl Iterator<Item = (String, String)> {
+    models.replacements().map(|(name, model)| (format!("{MODEL}{name}"), model.file().to_string()))
+}
+
+/// The models that come with Tercel, with those of these files in the place of some.
+fn opened(files: &BTreeMap<String, PathBuf>) -> Result<Models, StudyError> {
+    let mut models = Models::default();
+    for (name, file) in files {
+        models = models.with(name, Model::open(file)?)?;
+    }
+    Ok(models)
+}
+
 /// The experiment that a plan describes.
 ///
 /// # Errors
@@ -351,10 +386,15 @@ pub fn experiment_of(plan: &Plan) -> Result<Box<dyn Experiment>, StudyError> {
         options: plan
             .options
             .iter()
-            .filter(|(name, _)| !["set", "data"].contains(&name.as_str()))
+            .filter(|(name, _)| !["set", "data"].contains(&name.as_str()) && !name.starts_with(MODEL))
             .map(|(name, value)| (name.clone(), value.clone()))
             .collect(),
         data: plan.options.get("data").map(PathBuf::from),
+        models: plan
+            .options
+            .iter()
+            .filter_map(|(name, file)| Some((name.strip_prefix(MODEL)?.to_owned(), file.into())))
+            .collect(),
     };
     let experiment = Study::find(&plan.study)?.experiment(&choice)?;
     if experiment.plan() == plan {

@@ -20,6 +20,14 @@ fn trimmed(name: &str) -> Result<String, Infallible> {
     Ok(name.trim().to_owned())
 }
 
+/// The parts of `NAME=FILE`.
+fn replacement(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, file)) if !name.is_empty() && !file.is_empty() => Ok((name.to_owned(), file.into())),
+        _ => Err("expected NAME=FILE, as in `neural-imm=mine.safetensors`".to_owned()),
+    }
+}
+
 /// Run a study: a scenario, several methods, their scores.
 ///
 /// Prints a table with mean, standard deviation, 95 % bootstrap interval and, where there is one, the published figure. The
@@ -63,6 +71,9 @@ pub struct StudyArguments {
     /// Threads to use; without it, one for each core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Use the model of a file in the place of the shipped one of this name; may be given several times.
+    #[arg(long = "model", value_name = "NAME=FILE", value_parser = replacement)]
+    models: Vec<(String, PathBuf)>,
     /// Folder with the recordings of a study on real data, or a file of recorded tracks.
     #[arg(long, value_name = "PATH")]
     data: Option<PathBuf>,
@@ -95,6 +106,7 @@ Studies:
   clutter-partial  nine objects in dense clutter, two of which manoeuvre
   clutter-all      six objects in clutter that all manoeuvre at once
   clutter-random   random scenes of 5 to 12 objects that come, go and manoeuvre in clutter
+  paris            aircraft around Paris as they flew, seen by a simulated radar
   autoferry        radar and lidar of a small ferry against the GNSS truth of two boats
 
 Examples:
@@ -104,6 +116,7 @@ Examples:
   tercel study merge shards -o results
   tercel study vehicle --generator smooth --sizes random --runs 10
   tercel study aircraft --data tracks.npy
+  tercel study atc-test --methods imm,neural-imm --model neural-imm=mine.safetensors
   tercel study autoferry --data data/autoferry --json -o results";
 
 const LIST_AFTER: &str = "\
@@ -141,6 +154,7 @@ impl StudyArguments {
             set: self.set.clone(),
             options: options.into_iter().filter_map(given).collect(),
             data: self.data.clone(),
+            models: self.models.iter().cloned().collect(),
         };
         let experiment = study.experiment(&choice)?;
         match (self.shard, &self.output) {
@@ -207,6 +221,7 @@ impl StudyArguments {
             ("--sizes", self.sizes.is_some()),
             ("--shard", self.shard.is_some()),
             ("--threads", self.threads.is_some()),
+            ("--model", !self.models.is_empty()),
         ];
         if let Some((option, _)) = drawn.iter().find(|(_, given)| *given) {
             let message = format!(

@@ -16,7 +16,7 @@ mod tests;
 /// p_ij = Σ_{θ ∋ (i,j)} weight(θ) / Σ_θ weight(θ)
 /// ```
 /// Rows that share no column, not even through others, are told apart. In a cluster with few assignments these are
-/// enumerated. In a larger one loopy belief propagation approximates their sum: messages between rows and columns,
+/// enumerated, but for columns that only one row wants: these stand in no other's way. In a larger one loopy belief propagation approximates their sum: messages between rows and columns,
 /// ```text
 /// row to column    m_ij = w_ij / (1 + Σ_{k≠j} w_ik n_ik)
 /// column to row    n_ij = 1 / (1 + Σ_{k≠i} m_kj)
@@ -48,7 +48,10 @@ pub struct Marginals {
     pairs: Vec<f64>,
     misses: Vec<f64>,
     clusters: Clusters,
+    /// Places of the valid pairs, by cluster and row.
     order: Vec<usize>,
+    /// Cluster of each row.
+    homes: Vec<usize>,
     local: Local,
 }
 
@@ -61,6 +64,8 @@ struct Local {
     entries: Vec<Entry>,
     /// First entry of each row, and the end.
     starts: Vec<usize>,
+    /// How many rows want each column.
+    wanted: Vec<usize>,
     /// Probability of each entry.
     result: Vec<f64>,
     /// Local number of each column of the whole problem, in the cluster of this stamp.
@@ -89,8 +94,8 @@ impl Default for Marginals {
 }
 
 impl Marginals {
-    /// Enumerates the clusters that have up to `exact` assignments (counted without their conflicts), and approximates the
-    /// others.
+    /// Enumerates the clusters that have up to `exact` assignments of the columns that several rows want (counted without their
+    /// conflicts), and approximates the others.
     pub fn with_exact(exact: usize) -> Self {
         Marginals {
             exact,
@@ -98,6 +103,7 @@ impl Marginals {
             misses: Vec::new(),
             clusters: Clusters::default(),
             order: Vec::new(),
+            homes: Vec::new(),
             local: Local::default(),
         }
     }
@@ -117,15 +123,17 @@ impl Marginals {
         self.order.extend((0..pairs.len()).filter(valid));
         let pair = |place: &usize| (pairs[*place].0, pairs[*place].1);
         self.clusters.build(self.order.iter().map(pair), rows, columns);
-        let clusters = &mut self.clusters;
-        self.order.sort_by_cached_key(|place| (clusters.of(pairs[*place].0), pairs[*place].0, *place));
+        self.homes.clear();
+        self.homes.extend((0..rows).map(|row| self.clusters.of(row)));
+        let homes = &self.homes;
+        self.order.sort_unstable_by_key(|place| (homes[pairs[*place].0], pairs[*place].0, *place));
         self.local.numbers.clear();
         self.local.numbers.resize(columns, (usize::MAX, 0));
         let mut first = 0;
         while first < self.order.len() {
-            let cluster = self.clusters.of(pairs[self.order[first]].0);
+            let cluster = self.homes[pairs[self.order[first]].0];
             let members = self.order[first..].iter();
-            let count = members.take_while(|place| self.clusters.of(pairs[**place].0) == cluster).count();
+            let count = members.take_while(|place| self.homes[pairs[**place].0] == cluster).count();
             self.local.fill(pairs, &self.order[first..first + count], cluster);
             self.solve_local();
             first += count;
@@ -140,9 +148,7 @@ impl Marginals {
 
     fn solve_local(&mut self) {
         let local = &mut self.local;
-        let sizes = local.starts.windows(2).map(|range| range[1] - range[0] + 1);
-        let events = sizes.fold(1_usize, |events, size| events.saturating_mul(size));
-        if events <= self.exact {
+        if local.events() <= self.exact {
             enumeration::solve(local);
         } else {
             propagation::solve(local);
@@ -168,6 +174,7 @@ impl Local {
     fn fill(&mut self, pairs: &[(usize, usize, f64)], places: &[usize], cluster: usize) {
         self.entries.clear();
         self.starts.clear();
+        self.wanted.clear();
         (self.rows, self.columns) = (0, 0);
         let mut last = None;
         for &place in places {
@@ -180,7 +187,9 @@ impl Local {
             if self.numbers[column].0 != cluster {
                 self.numbers[column] = (cluster, self.columns);
                 self.columns += 1;
+                self.wanted.push(0);
             }
+            self.wanted[self.numbers[column].1] += 1;
             let weight = ln.clamp(-LARGEST_LN, LARGEST_LN).exp();
             self.entries.push(Entry { row: self.rows - 1, column: self.numbers[column].1, weight, place });
         }

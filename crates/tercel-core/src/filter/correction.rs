@@ -54,20 +54,32 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
     #[inline(always)]
     pub fn condition(&self, sensor: &impl Sensor<N, M>, belief: &mut Gaussian<N>) -> Result<(), FilterError> {
         let gain = self.factor.right_solve(&self.cross);
-        // (I - K H) P (I - K H)ᵀ + K R Kᵀ, with A = (I - K H) P = P - K (P Hᵀ)ᵀ computed once.
-        let shrunk = belief.covariance - gain * self.cross.transpose();
-        let mut covariance =
-            shrunk - (sensor.project(&shrunk, &self.jacobian) - gain * self.noise) * gain.transpose();
-        positive::symmetrise(&mut covariance);
         let mean = belief.mean + gain * self.residual;
-        if !positive::is_definite(&covariance) {
-            covariance = self.factored(belief, &gain)?;
-        }
+        let covariance = self.conditioned(sensor, belief, &gain)?;
         if !mean.iter().all(|x| x.is_finite()) {
             return Err(FilterError::NotFinite { what: "state mean" });
         }
         *belief = Gaussian { mean, covariance };
         Ok(())
+    }
+
+    /// The covariance after the measurement: `(I - K H) P (I - K H)ᵀ + K R Kᵀ`.
+    #[inline(always)]
+    fn conditioned(
+        &self,
+        sensor: &impl Sensor<N, M>,
+        belief: &Gaussian<N>,
+        gain: &SMatrix<f64, N, M>,
+    ) -> Result<SMatrix<f64, N, N>, FilterError> {
+        // With A = (I - K H) P = P - K (P Hᵀ)ᵀ computed once.
+        let shrunk = belief.covariance - gain * self.cross.transpose();
+        let mut covariance =
+            shrunk - (sensor.project(&shrunk, &self.jacobian) - gain * self.noise) * gain.transpose();
+        positive::symmetrise(&mut covariance);
+        if !positive::is_definite(&covariance) {
+            covariance = self.factored(belief, gain)?;
+        }
+        Ok(covariance)
     }
 
     /// The same covariance from a factor `L` of the old one, `(L - K H L)(L - K H L)ᵀ + K R Kᵀ`. Slower, but cancels only
@@ -84,6 +96,80 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         positive::settle(&mut covariance, "state covariance")?;
         Ok(covariance)
     }
+}
+
+/// Compares a belief with several measurements. What the expected reading shares with them all is computed once, and the factor
+/// of the innovation covariance once for readings of the same noise.
+pub(crate) fn compare_all<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    belief: &Gaussian<N>,
+    measurements: &[&Measurement<M>],
+    found: &mut Vec<Result<Innovation, FilterError>>,
+) {
+    let expected = sensor.expected(&belief.mean);
+    let jacobian = sensor.jacobian(&belief.mean);
+    let spread = jacobian * sensor.project(&belief.covariance, &jacobian);
+    let mut last: Option<(SMatrix<f64, M, M>, Cholesky<M>, f64)> = None;
+    found.clear();
+    found.extend(measurements.iter().map(|measurement| {
+        let reading = sensor.read(measurement);
+        let residual = sensor.difference(&reading.value, &expected);
+        if !residual.iter().all(|x| x.is_finite()) {
+            return Err(FilterError::NotFinite { what: "innovation" });
+        }
+        let (_, factor, ln_peak) = match &last {
+            Some(shared) if shared.0 == reading.noise => shared,
+            _ => {
+                let factor = Cholesky::new(&(spread + reading.noise), "innovation covariance")?;
+                last.insert((reading.noise, factor, factor.ln_density(0.0)))
+            }
+        };
+        let nis = factor.mahalanobis(&residual);
+        Ok(Innovation::new(&residual, nis, ln_peak - 0.5 * nis))
+    }));
+}
+
+/// Conditions a belief on several measurements with one gain, which is exact if their noise is the same: the means differ by what
+/// the gain makes of the residuals, and the covariance is common. Returns the weight of the measurements; none, and leaves the
+/// belief as it was, where that is not possible.
+pub(crate) fn associate<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    belief: &mut Gaussian<N>,
+    parts: &[(f64, &Measurement<M>)],
+    none: f64,
+) -> Option<f64> {
+    let common = sensor.read(parts.first()?.1);
+    let comparison = Comparison::of_reading(sensor, belief, &common).ok()?;
+    let expected = sensor.expected(&belief.mean);
+    // Mean and covariance of the residual; it is zero where no measurement is the object's own.
+    let (mut mean, mut scatter) = (SVector::<f64, M>::zeros(), SMatrix::<f64, M, M>::zeros());
+    let (mut total, mut weight) = (none, 0.0);
+    for (part, measurement) in parts.iter().filter(|part| part.0 > 0.0) {
+        let reading = sensor.read(measurement);
+        let difference = sensor.difference(&reading.value, &expected) - mean;
+        if reading.noise != common.noise || !difference.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        (total, weight) = (total + part, weight + part);
+        let share = part / total;
+        mean += difference * share;
+        scatter = scatter * (1.0 - share) + difference * difference.transpose() * (share * (1.0 - share));
+    }
+    if weight == 0.0 {
+        return Some(0.0);
+    }
+    let gain = comparison.factor.right_solve(&comparison.cross);
+    let conditioned = comparison.conditioned(sensor, belief, &gain).ok()?;
+    let share = weight / total;
+    let mut covariance =
+        belief.covariance * (1.0 - share) + conditioned * share + gain * scatter * gain.transpose();
+    positive::symmetrise(&mut covariance);
+    let mean = belief.mean + gain * mean;
+    if !positive::is_definite(&covariance) || !mean.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    *belief = Gaussian { mean, covariance };
+    Some(weight)
 }
 
 /// The belief after `dt` by a motion, to first order.

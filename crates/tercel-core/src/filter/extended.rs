@@ -1,8 +1,8 @@
 //! The extended Kalman filter.
 
-use super::correction::{Comparison, predicted};
+use super::correction::{self, Comparison, predicted};
 use super::gaussian::gaussian_belief;
-use super::{Filter, Innovation};
+use super::{Filter, Innovation, one_by_one};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::motion::Motion;
@@ -82,6 +82,20 @@ where
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         Ok(Comparison::new(&self.sensor, belief, measurement)?.innovation)
+    }
+
+    fn innovations(
+        &self,
+        belief: &Gaussian<N>,
+        measurements: &[&Measurement<M>],
+        found: &mut Vec<Result<Innovation, FilterError>>,
+    ) {
+        correction::compare_all(&self.sensor, belief, measurements, found);
+    }
+
+    fn associate(&self, belief: &mut Gaussian<N>, parts: &[(f64, &Measurement<M>)], none: f64) -> f64 {
+        correction::associate(&self.sensor, belief, parts, none)
+            .unwrap_or_else(|| one_by_one(self, belief, parts, none))
     }
 
     gaussian_belief!(M);

@@ -267,6 +267,57 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
         blend.finish().ok_or_else(|| nothing_updated(failure))
     }
 
+    fn innovations(
+        &self,
+        belief: &Self::Belief,
+        measurements: &[&F::Measurement],
+        found: &mut Vec<Result<Innovation, FilterError>>,
+    ) {
+        let mut blends: Vec<(Blend, Option<FilterError>)> = Vec::new();
+        blends.resize_with(measurements.len(), Default::default);
+        for ((mode, filter), probability) in belief.modes.iter().zip(&self.filters).zip(&belief.probabilities)
+        {
+            let ln_probability = probability.ln();
+            filter.innovations(&mode.belief, measurements, found);
+            for ((blend, failure), innovation) in blends.iter_mut().zip(found.drain(..)) {
+                match innovation {
+                    Ok(innovation) => {
+                        blend.add_weighted(*probability, ln_probability, &innovation);
+                    }
+                    Err(error) => {
+                        failure.get_or_insert(error);
+                    }
+                }
+            }
+        }
+        let finish = |(blend, failure): (Blend, _)| blend.finish().ok_or_else(|| nothing_updated(failure));
+        found.extend(blends.into_iter().map(finish));
+    }
+
+    /// Each mode with the shares that it has in the measurements, so that no update is made for itself alone.
+    fn associate(&self, belief: &mut Self::Belief, parts: &[(f64, &F::Measurement)], none: f64) -> f64 {
+        let shares = self.shares(belief, parts);
+        let weight: f64 =
+            parts.iter().zip(&shares.explained).filter(|(_, ok)| **ok).map(|(part, _)| part.0).sum();
+        if weight <= 0.0 {
+            return 0.0;
+        }
+        let mut own = Vec::with_capacity(parts.len());
+        let modes = belief.modes.iter_mut().zip(&mut belief.probabilities);
+        for (((mode, probability), filter), shares) in
+            modes.zip(&self.filters).zip(shares.of_modes.chunks(parts.len()))
+        {
+            own.clear();
+            own.extend(
+                parts.iter().zip(shares).map(|((weight, measurement), share)| (weight * share, *measurement)),
+            );
+            let missed = none * *probability;
+            let updated = filter.associate(&mut mode.belief, &own, missed);
+            *probability = ((updated + missed) / (weight + none)).max(FLOOR);
+        }
+        weight
+    }
+
     fn state(&self, belief: &Self::Belief) -> Gaussian<N> {
         let states = belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
         moments(states.map(|((mode, filter), probability)| (*probability, filter.state(&mode.belief))))
@@ -341,6 +392,53 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
 
     fn ln_clutter(&self, measurement: &F::Measurement, intensity: f64) -> f64 {
         self.filters.first().map_or(0.0, |filter| filter.ln_clutter(measurement, intensity))
+    }
+}
+
+/// How the modes share in measurements.
+struct Shares {
+    /// Probability of each mode given each measurement; a row for each mode.
+    of_modes: Vec<f64>,
+    /// Whether any mode can be updated by each measurement.
+    explained: Vec<bool>,
+}
+
+impl<F> Imm<F> {
+    fn shares<const N: usize>(
+        &self,
+        belief: &ImmBelief<F::Belief, N>,
+        parts: &[(f64, &F::Measurement)],
+    ) -> Shares
+    where
+        F: Filter<N>,
+    {
+        let count = parts.len();
+        let measurements: Vec<&F::Measurement> = parts.iter().map(|part| part.1).collect();
+        let mut of_modes = Vec::with_capacity(count * self.filters.len());
+        let mut found = Vec::with_capacity(count);
+        let mut explained = vec![false; count];
+        for ((mode, filter), probability) in belief.modes.iter().zip(&self.filters).zip(&belief.probabilities)
+        {
+            let ln_probability = probability.ln();
+            filter.innovations(&mode.belief, &measurements, &mut found);
+            for (innovation, explained) in found.drain(..).zip(&mut explained) {
+                *explained |= innovation.is_ok();
+                let weight = innovation.map_or(f64::NEG_INFINITY, |one| ln_probability + one.log_likelihood);
+                // A likelihood that overflowed or is not a number counts as zero.
+                of_modes.push(if weight < f64::INFINITY { weight } else { f64::NEG_INFINITY });
+            }
+        }
+        for column in 0..count {
+            let rows = || (column..of_modes.len()).step_by(count);
+            let top = rows().map(|place| of_modes[place]).fold(f64::NEG_INFINITY, f64::max);
+            let sum: f64 = rows().map(|place| (of_modes[place] - top).exp()).sum();
+            for (place, probability) in (column..of_modes.len()).step_by(count).zip(&belief.probabilities) {
+                // A measurement that no mode can explain says nothing about which one it is.
+                let known = top > f64::NEG_INFINITY;
+                of_modes[place] = if known { (of_modes[place] - top).exp() / sum } else { *probability };
+            }
+        }
+        Shares { of_modes, explained }
     }
 }
 

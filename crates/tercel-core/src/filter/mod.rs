@@ -11,6 +11,7 @@
 //! | [`Padded`] | Gaussian | a model with a smaller state beside one with a larger |
 
 mod correction;
+mod either;
 mod estimate;
 mod extended;
 mod gaussian;
@@ -34,6 +35,7 @@ use crate::error::FilterError;
 use crate::extended::InverseWishart;
 
 pub(crate) use correction::{Comparison, predicted};
+pub use either::Either;
 pub use estimate::Estimate;
 pub use extended::Extended;
 pub use imm::{Imm, ImmBelief};
@@ -108,6 +110,27 @@ pub trait Filter<const N: usize> {
         self.update(&mut belief.clone(), measurement)
     }
 
+    /// Compares the belief with several measurements: writes to `found` what [`innovation`](Filter::innovation) says of each.
+    /// Filters override it that can compute once what these share.
+    fn innovations(
+        &self,
+        belief: &Self::Belief,
+        measurements: &[&Self::Measurement],
+        found: &mut Vec<Result<Innovation, FilterError>>,
+    ) {
+        found.clear();
+        found.extend(measurements.iter().map(|measurement| self.innovation(belief, measurement)));
+    }
+
+    /// Conditions the belief on a choice of measurements of which at most one is the object's own: each with the weight that
+    /// it is, and `none` for the case that no one is. The belief becomes the merger of those updated by each and of the one that
+    /// is left as it was. The weights need not be normalised. Measurements by which the belief cannot be updated are left out.
+    ///
+    /// Returns the sum of the weights of the others. If that is zero the belief is unchanged.
+    fn associate(&self, belief: &mut Self::Belief, parts: &[(f64, &Self::Measurement)], none: f64) -> f64 {
+        one_by_one(self, belief, parts, none)
+    }
+
     /// Mean and covariance of the state.
     fn state(&self, belief: &Self::Belief) -> Gaussian<N>;
 
@@ -164,6 +187,35 @@ pub trait Filter<const N: usize> {
     }
 }
 
+/// What [`Filter::associate`] does, with an update for each measurement.
+pub(crate) fn one_by_one<const N: usize, F: Filter<N> + ?Sized>(
+    filter: &F,
+    belief: &mut F::Belief,
+    parts: &[(f64, &F::Measurement)],
+    none: f64,
+) -> f64 {
+    let mut merged: Option<F::Belief> = None;
+    let mut total = 0.0;
+    for (weight, measurement) in parts.iter().filter(|part| part.0 > 0.0) {
+        let mut updated = belief.clone();
+        if filter.update(&mut updated, measurement).is_err() {
+            continue;
+        }
+        match &mut merged {
+            Some(merged) => filter.merge(merged, total, &updated, *weight),
+            None => merged = Some(updated),
+        }
+        total += weight;
+    }
+    if let Some(mut merged) = merged {
+        if none > 0.0 {
+            filter.merge(&mut merged, total, belief, none);
+        }
+        *belief = merged;
+    }
+    total
+}
+
 /// A boxed filter is a filter: filters of different types stand side by side as `Box<dyn Filter<..>>`, as long as
 /// their beliefs and measurements agree.
 impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
@@ -189,6 +241,17 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
         measurement: &Self::Measurement,
     ) -> Result<Innovation, FilterError> {
         (**self).innovation(belief, measurement)
+    }
+    fn innovations(
+        &self,
+        belief: &Self::Belief,
+        measurements: &[&Self::Measurement],
+        found: &mut Vec<Result<Innovation, FilterError>>,
+    ) {
+        (**self).innovations(belief, measurements, found);
+    }
+    fn associate(&self, belief: &mut Self::Belief, parts: &[(f64, &Self::Measurement)], none: f64) -> f64 {
+        (**self).associate(belief, parts, none)
     }
     fn state(&self, belief: &Self::Belief) -> Gaussian<N> {
         (**self).state(belief)
@@ -227,3 +290,6 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
         (**self).predict_all(beliefs, dt);
     }
 }
+
+#[cfg(test)]
+mod tests;

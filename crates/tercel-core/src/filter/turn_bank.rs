@@ -9,8 +9,8 @@ use crate::motion::{AccelerationNoise, Turn};
 /// ## Definition
 /// One [`Extended`] filter of a [`Turn`] for each rate (with a linear sensor that is the Kalman filter), mixed by an [`Imm`]. With
 /// several acceleration noises there is one filter for each pair of rate and noise, and with several sensors in
-/// [`estimating`](TurnBank::estimating) one for each triple: the bank then learns from the innovations how calm the target is and
-/// how accurate the sensor, which do not change. The rates are the innermost: the modes go through all rates with the first noise,
+/// [`estimating`](TurnBank::estimating) one for each triple: the bank then learns from the innovations how calm the target is
+/// (which does not change, [unless told](TurnBank::with_noise_transition)) and how accurate the sensor, which does not. The rates are the innermost: the modes go through all rates with the first noise,
 /// then all with the next, and so on with the next sensor.
 ///
 /// ## Use it when
@@ -42,6 +42,7 @@ pub struct TurnBank {
     noises: Vec<AccelerationNoise>,
     speed: f64,
     transition: Transition,
+    noise_transition: Transition,
 }
 
 impl TurnBank {
@@ -64,6 +65,7 @@ impl TurnBank {
             noises: vec![AccelerationNoise::Piecewise(11.0)],
             speed: 300.0,
             transition: Transition::sticky(0.985).per(1.0),
+            noise_transition: Transition::sticky(1.0),
         })
     }
 
@@ -109,6 +111,11 @@ impl TurnBank {
         TurnBank { transition, ..self }
     }
 
+    /// Sets how the target changes between the noises of the acceleration. By default it does not.
+    pub fn with_noise_transition(self, noise_transition: Transition) -> Self {
+        TurnBank { noise_transition, ..self }
+    }
+
     /// The turn rates, rad/s.
     pub fn rates(&self) -> &[f64] {
         &self.rates
@@ -132,9 +139,10 @@ impl TurnBank {
     /// # Errors
     /// When there is no sensor, or the transition does not fit the number of rates.
     pub fn estimating<S: Clone>(&self, sensors: &[S]) -> Result<Imm<Extended<Turn, S>>, FilterError> {
-        let constant = |count| (Transition::sticky(1.0), count);
+        let sensors_stay = (Transition::sticky(1.0), sensors.len());
+        let noises = (self.noise_transition.clone(), self.noises.len());
         let rates = (self.transition.clone(), self.rates.len());
-        let transition = Transition::joint([constant(sensors.len()), constant(self.noises.len()), rates]);
+        let transition = Transition::joint([sensors_stay, noises, rates]);
         Imm::new(sensors.iter().flat_map(|sensor| self.modes(sensor)), transition)
     }
 

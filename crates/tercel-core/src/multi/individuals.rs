@@ -100,4 +100,21 @@ impl<B: Clone> Individuals<B> {
             self.tracks.push(track);
         }
     }
+
+    /// Gives up the tracks that hardly exist while there are more than `cap`; the confirmed ones last.
+    pub fn drop_weakest(&mut self, cap: usize) {
+        let alive = |track: &Track<B>| track.status != Status::Deleted;
+        let mut order: Vec<usize> = (0..self.tracks.len()).filter(|&row| alive(&self.tracks[row])).collect();
+        let surplus = order.len().saturating_sub(cap);
+        if surplus == 0 {
+            return;
+        }
+        order.sort_by(|&a, &b| {
+            let (a, b) = (&self.tracks[a], &self.tracks[b]);
+            a.confirmed.cmp(&b.confirmed).then(a.existence.total_cmp(&b.existence)).then(b.id.cmp(&a.id))
+        });
+        for &weak in &order[..surplus] {
+            self.tracks[weak].status = Status::Deleted;
+        }
+    }
 }

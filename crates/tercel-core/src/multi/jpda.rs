@@ -2,7 +2,7 @@
 
 use crate::association::{Gate, Marginals};
 use crate::error::FilterError;
-use crate::filter::Filter;
+use crate::filter::{Filter, Innovation};
 
 use super::individuals::Individuals;
 use super::vicinity::Vicinity;
@@ -73,6 +73,8 @@ pub struct JpdaConfig {
     pub birth: f64,
     /// Of two tracks closer than this squared Mahalanobis distance the one less sure to exist is dropped. Zero keeps both.
     pub merge: f64,
+    /// Largest number of tracks; beyond, those that hardly exist are given up.
+    pub cap: usize,
     /// When tracks are confirmed and deleted.
     pub management: Management,
 }
@@ -84,6 +86,7 @@ impl Default for JpdaConfig {
             survival: 0.99,
             birth: 0.1,
             merge: 0.5,
+            cap: 10_000,
             management: Management::default(),
         }
     }
@@ -93,17 +96,24 @@ impl Default for JpdaConfig {
 #[derive(Debug, Clone, Default)]
 struct Scratch {
     vicinity: Vicinity,
+    /// What the track that is looked at makes of the measurements near it.
+    innovations: Vec<Result<Innovation, FilterError>>,
     marginals: Marginals,
     /// Track, measurement and `ln w` of the pairs in a gate, by track.
     pairs: Vec<(usize, usize, f64)>,
     /// Detection probability of each track.
     detection: Vec<f64>,
+    /// Logarithm of the clutter intensity at each measurement.
+    ln_clutter: Vec<f64>,
     /// Probability that some track claims each measurement.
     claimed: Vec<f64>,
 }
 
 /// A share of the belief that is left out.
 const NEGLIGIBLE: f64 = 1e-4;
+
+/// Its logarithm.
+const LN_NEGLIGIBLE: f64 = -9.210_340_371_976_182;
 
 /// A measurement starts a track unless the others claim it with more than this probability.
 const CLAIMED: f64 = 0.9;
@@ -126,21 +136,27 @@ impl<B: Clone> Jpda<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { vicinity, marginals, pairs, detection, claimed } = &mut self.scratch;
+        let Scratch { vicinity, innovations, marginals, pairs, detection, ln_clutter, claimed } =
+            &mut self.scratch;
         pairs.clear();
         detection.clear();
+        ln_clutter.clear();
+        ln_clutter
+            .extend(scan.measurements.iter().map(|measurement| ln_clutter_at(filter, scan, measurement)));
+        let mut compared: Vec<&F::Measurement> = Vec::new();
         for (row, track) in self.objects.tracks.iter().enumerate() {
             let (seen, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
             detection.push(seen);
             let prior = (track.existence * seen).ln() - (1.0 - track.existence * seen).ln();
-            for &column in near {
+            compared.clear();
+            compared.extend(near.iter().map(|&column| &scan.measurements[column]));
+            filter.innovations(&track.belief, &compared, innovations);
+            for (&column, innovation) in near.iter().zip(&*innovations) {
                 // A pair that cannot be compared numerically is a pair outside the gate.
-                let Ok(innovation) = filter.innovation(&track.belief, &scan.measurements[column]) else {
-                    continue;
-                };
-                let ln_clutter = ln_clutter_at(filter, scan, &scan.measurements[column]);
-                let weight = prior + innovation.log_likelihood - ln_clutter;
-                if self.config.gate.contains(&innovation) && !weight.is_nan() {
+                let Ok(innovation) = innovation else { continue };
+                let weight = prior + innovation.log_likelihood - ln_clutter[column];
+                // No pair is more probable than its weight. One that is not a number does not count.
+                if self.config.gate.contains(innovation) && weight >= LN_NEGLIGIBLE {
                     pairs.push((row, column, weight));
                 }
             }
@@ -162,6 +178,7 @@ impl<B: Clone> Jpda<B> {
         let Scratch { marginals, pairs, detection, .. } = &self.scratch;
         // How probable the pair is for which each measurement counts as used.
         let mut best_use = vec![0.0; scan.measurements.len()];
+        let mut parts: Vec<(f64, &F::Measurement)> = Vec::new();
         let mut first = 0;
         for (row, track) in self.objects.tracks.iter_mut().enumerate() {
             let count = pairs[first..].iter().take_while(|pair| pair.0 == row).count();
@@ -169,36 +186,22 @@ impl<B: Clone> Jpda<B> {
             first = range.end;
             let (seen, r) = (detection[row], track.existence);
             let missed = marginals.misses()[row] * r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
-            let parts = pairs[range.clone()].iter().zip(&marginals.pairs()[range]);
-            let mut belief: Option<B> = None;
-            let (mut weight, mut heaviest) = (0.0, (0.0, None));
-            for (&(_, column, _), &probability) in parts {
-                if probability < NEGLIGIBLE {
-                    continue;
+            let mut heaviest = (0.0, None);
+            parts.clear();
+            for (&(_, column, _), &probability) in pairs[range.clone()].iter().zip(&marginals.pairs()[range])
+            {
+                if probability >= NEGLIGIBLE {
+                    parts.push((probability, &scan.measurements[column]));
                 }
-                let mut part = track.belief.clone();
-                if filter.update(&mut part, &scan.measurements[column]).is_err() {
-                    continue;
-                }
-                match &mut belief {
-                    Some(belief) => filter.merge(belief, weight, &part, probability),
-                    None => belief = Some(part),
-                }
-                weight += probability;
                 if probability > heaviest.0 {
                     heaviest = (probability, Some(column));
                 }
             }
-            if let Some(mut belief) = belief {
-                if missed > NEGLIGIBLE * weight {
-                    filter.merge(&mut belief, weight, &track.belief, missed);
-                }
-                track.belief = belief;
-            }
+            let weight = filter.associate(&mut track.belief, &parts, missed);
             track.existence = (weight + missed).min(1.0);
             match heaviest.1 {
                 // Seen means: more likely seen than not, if it is there at all.
-                Some(column) if weight >= 0.5 * track.existence => {
+                Some(column) if weight > 0.0 && weight >= 0.5 * track.existence => {
                     track.hit(column, scan.time);
                     if heaviest.0 > best_use[column] {
                         best_use[column] = heaviest.0;
@@ -222,6 +225,7 @@ impl<B: Clone> Jpda<B> {
             if rest < 1.0 - CLAIMED { 0.0 } else { rest }
         };
         self.objects.birth(filter, scan, self.config.birth, &self.config.management, unexplained);
+        self.objects.drop_weakest(self.config.cap);
     }
 }
 

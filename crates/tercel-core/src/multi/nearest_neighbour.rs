@@ -69,6 +69,8 @@ pub struct NearestNeighbourConfig {
     pub birth: f64,
     /// Of two tracks closer than this squared Mahalanobis distance the one less sure to exist is dropped. Zero keeps both.
     pub merge: f64,
+    /// Largest number of tracks; beyond, those that hardly exist are given up.
+    pub cap: usize,
     /// When tracks are confirmed and deleted.
     pub management: Management,
 }
@@ -80,6 +82,7 @@ impl Default for NearestNeighbourConfig {
             survival: 0.99,
             birth: 0.1,
             merge: 0.5,
+            cap: 100_000,
             management: Management::default(),
         }
     }
@@ -203,6 +206,7 @@ impl<B: Clone> Tracker for NearestNeighbour<B> {
         self.update(filter, scan);
         self.objects.drop_doubles(filter, self.config.merge);
         self.objects.birth(filter, scan, self.config.birth, &self.config.management, |_| 1.0);
+        self.objects.drop_weakest(self.config.cap);
         self.time = Some(scan.time);
         Ok(())
     }

@@ -35,8 +35,8 @@ pub use kalman_net::{
     Architecture, Covariance, Feature, GainNetwork, KalmanNet, KalmanNetBelief, KalmanNetHyper,
 };
 pub use liquid::{
-    Absolute, Derivative, Form, LiquidBelief, LiquidHyper, LiquidKalman, LiquidNetwork, Moved, Predictions,
-    Residual, Seen, Span,
+    Absolute, Derivative, Form, LiquidBelief, LiquidHyper, LiquidKalman, LiquidMemory, LiquidMotion,
+    LiquidNetwork, Moved, Predictions, Residual, Seen, Span, surprise, widths,
 };
 pub use memory::Memory;
 pub use mnemonic::{MnemonicBelief, MnemonicHyper, MnemonicKalman, MnemonicNetwork};

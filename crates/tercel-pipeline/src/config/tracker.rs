@@ -46,6 +46,9 @@ pub struct NearestNeighbourConfig {
     /// Of two tracks closer than this squared Mahalanobis distance the weaker is dropped; 0 keeps both.
     #[schemars(extend("x-unit" = "1"))]
     pub merge: NonNegative,
+    /// Largest number of tracks; beyond, those that hardly exist are given up.
+    #[schemars(extend("x-unit" = "1"))]
+    pub cap: Count,
     /// When tracks are confirmed and given up.
     pub management: ManagementConfig,
 }
@@ -57,6 +60,7 @@ impl Default for NearestNeighbourConfig {
             survival: Probability::constant(0.99),
             birth: Probability::constant(0.1),
             merge: NonNegative::constant(0.5),
+            cap: Count::constant(100_000),
             management: ManagementConfig::default(),
         }
     }
@@ -69,6 +73,7 @@ impl NearestNeighbourConfig {
             survival: self.survival.get(),
             birth: self.birth.get(),
             merge: self.merge.get(),
+            cap: self.cap.get() as usize,
             management: self.management.build(),
         })
     }
@@ -222,6 +227,9 @@ pub struct JpdaConfig {
     /// Of two tracks closer than this squared Mahalanobis distance the weaker is dropped; 0 keeps both.
     #[schemars(extend("x-unit" = "1"))]
     pub merge: NonNegative,
+    /// Largest number of tracks; beyond, those that hardly exist are given up.
+    #[schemars(extend("x-unit" = "1"))]
+    pub cap: Count,
     /// When tracks are confirmed and given up.
     pub management: ManagementConfig,
 }
@@ -234,6 +242,7 @@ impl Default for JpdaConfig {
             survival: nearest.survival,
             birth: nearest.birth,
             merge: nearest.merge,
+            cap: Count::constant(10_000),
             management: nearest.management,
         }
     }
@@ -246,6 +255,7 @@ impl JpdaConfig {
             survival: self.survival.get(),
             birth: self.birth.get(),
             merge: self.merge.get(),
+            cap: self.cap.get() as usize,
             management: self.management.build(),
         })
     }

@@ -17,6 +17,7 @@ pub struct Scene {
     region: [Interval; 2],
     sensor: Sensor,
     steps: usize,
+    interval: f64,
 }
 
 /// What one object does.
@@ -65,6 +66,11 @@ impl Object {
         Object { first, states, manoeuvres }
     }
 
+    /// An object that was recorded: the scan in which it appears, and its states from then on.
+    pub fn recorded(first: usize, states: impl IntoIterator<Item = Vector4<f64>>) -> Self {
+        Object { first, states: states.into_iter().collect(), manoeuvres: Vec::new() }
+    }
+
     /// The scan in which it appears.
     pub fn first(&self) -> usize {
         self.first
@@ -75,7 +81,7 @@ impl Object {
         &self.states
     }
 
-    /// What led from each state to the next; one less than the states.
+    /// What led from each state to the next; one less than the states. Of a recorded object nothing is known.
     pub fn manoeuvres(&self) -> &[Manoeuvre] {
         &self.manoeuvres
     }
@@ -88,7 +94,18 @@ impl Object {
 
 impl Scene {
     pub(super) fn new(objects: Vec<Object>, region: [Interval; 2], sensor: Sensor, steps: usize) -> Self {
-        Scene { objects, region, sensor, steps }
+        Scene { objects, region, sensor, steps, interval: INTERVAL }
+    }
+
+    /// A scene of recorded objects, with `interval` seconds between scans.
+    pub fn recorded(
+        objects: Vec<Object>,
+        region: [Interval; 2],
+        sensor: Sensor,
+        steps: usize,
+        interval: f64,
+    ) -> Self {
+        Scene { objects, region, sensor, steps, interval }
     }
 
     /// The objects.
@@ -118,7 +135,7 @@ impl Scene {
 
     /// Time between scans, s.
     pub fn interval(&self) -> f64 {
-        INTERVAL
+        self.interval
     }
 
     /// The objects that are there in a scan, with their numbers.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use tercel_neural::shipped::Models;
 use tercel_sim::air_traffic::{AirTraffic, Radar};
 
 use super::methods::method;
@@ -11,6 +12,7 @@ use super::{Method, Recording, example};
 use crate::StudyError;
 use crate::monte_carlo::{Attempt, Curve, Example, Experiment, Plan, Quantity, Sweep};
 use crate::report::{Section, Table};
+use crate::studies::options_of;
 
 /// The seed of the published tables. It is reserved: nothing is tuned or trained on flights of this seed.
 pub const SEED: u64 = 7919;
@@ -41,23 +43,30 @@ impl AirTrafficExperiment {
         seed: u64,
         runs: u64,
         methods: &[String],
+        models: &Models,
     ) -> Result<Self, StudyError> {
-        Self::new(set, (set, None, vec![None]), seed, runs, methods)
+        Self::new(set, (set, None, vec![None]), seed, runs, methods, models)
     }
 
     /// Flights of the population `atc-validation`, each seen by its own radar.
     ///
     /// # Errors
     /// When a method is not known.
-    pub fn ablation(seed: u64, runs: u64, methods: &[String]) -> Result<Self, StudyError> {
-        Self::new("atc-validation", ("atc-ablation", None, vec![None]), seed, runs, methods)
+    pub fn ablation(seed: u64, runs: u64, methods: &[String], models: &Models) -> Result<Self, StudyError> {
+        Self::new("atc-validation", ("atc-ablation", None, vec![None]), seed, runs, methods, models)
     }
 
     /// The same flights, seen by radars with bearing deviations of 0.1 to 1 degrees.
     ///
     /// # Errors
     /// When a method is not known.
-    pub fn noise(set: &'static str, seed: u64, runs: u64, methods: &[String]) -> Result<Self, StudyError> {
+    pub fn noise(
+        set: &'static str,
+        seed: u64,
+        runs: u64,
+        methods: &[String],
+        models: &Models,
+    ) -> Result<Self, StudyError> {
         let sweep = Sweep {
             name: "bearing_deviation_deg".to_owned(),
             label: "Standard deviation of the bearing, degrees".to_owned(),
@@ -65,14 +74,20 @@ impl AirTrafficExperiment {
         };
         let radar = |degrees: &f64| Ok(Some(Radar::new(RANGE, degrees.to_radians())?));
         let radars = sweep.values.iter().map(radar).collect::<Result<_, StudyError>>()?;
-        Self::new(set, ("atc-noise", Some(sweep), radars), seed, runs, methods)
+        Self::new(set, ("atc-noise", Some(sweep), radars), seed, runs, methods, models)
     }
 
     /// The same flights, seen by radars that detect with a probability of 1 to 0.65.
     ///
     /// # Errors
     /// When a method is not known.
-    pub fn missing(set: &'static str, seed: u64, runs: u64, methods: &[String]) -> Result<Self, StudyError> {
+    pub fn missing(
+        set: &'static str,
+        seed: u64,
+        runs: u64,
+        methods: &[String],
+        models: &Models,
+    ) -> Result<Self, StudyError> {
         let sweep = Sweep {
             name: "detection".to_owned(),
             label: "Probability of detection".to_owned(),
@@ -81,7 +96,7 @@ impl AirTrafficExperiment {
         let radar =
             |chance: &f64| Ok(Some(Radar::new(RANGE, BEARING.to_radians())?.with_detection(*chance)?));
         let radars = sweep.values.iter().map(radar).collect::<Result<_, StudyError>>()?;
-        Self::new(set, ("atc-missing", Some(sweep), radars), seed, runs, methods)
+        Self::new(set, ("atc-missing", Some(sweep), radars), seed, runs, methods, models)
     }
 
     fn new(
@@ -90,21 +105,23 @@ impl AirTrafficExperiment {
         seed: u64,
         runs: u64,
         names: &[String],
+        models: &Models,
     ) -> Result<Self, StudyError> {
         let population = AirTraffic::named(set)
             .ok_or_else(|| StudyError::Option(format!("there is no population of flights `{set}`")))?;
-        let methods = names.iter().map(|name| method(name, &population)).collect::<Result<_, _>>()?;
+        let methods = names.iter().map(|name| method(name, &population, models)).collect::<Result<_, _>>()?;
         let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
             name: name.to_owned(),
             unit: unit.to_owned(),
             shown,
         };
         let short = set.trim_start_matches("atc-").to_owned();
+        let set_option = sweep.as_ref().map(|_| ("set".to_owned(), short));
         let plan = Plan {
             study: study.to_owned(),
             seed,
             runs,
-            options: if sweep.is_some() { [("set".to_owned(), short)].into() } else { BTreeMap::new() },
+            options: set_option.into_iter().chain(options_of(models)).collect(),
             // A sweep is drawn over what it changes, not over time.
             curves: if sweep.is_some() { Vec::new() } else { curves(&population) },
             sweep,

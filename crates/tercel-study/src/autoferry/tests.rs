@@ -16,6 +16,18 @@ fn the_shipped_configuration_keeps_its_level() {
 }
 
 #[test]
+fn the_shipped_mixture_of_hypotheses_keeps_its_level() {
+    let result = run(&folder(), &["imm-pmbm".to_string()], 1, &|_| {}).unwrap();
+    let row = &result.table.rows[0];
+    let mean = |name: &str| row.metrics[name].mean;
+    assert!(mean("covered") >= 0.94, "{}", mean("covered"));
+    assert!(mean("switches") <= 0.2, "{}", mean("switches"));
+    assert!(mean("gospa") <= 18.0, "{}", mean("gospa"));
+    assert!(mean("gospa_near") <= 11.0, "{}", mean("gospa_near"));
+    assert!(mean("rmse_pos_norm") <= 4.35, "{}", mean("rmse_pos_norm"));
+}
+
+#[test]
 fn recordings_come_by_their_numbers() {
     let names: Vec<String> = Recording::read_all(&folder()).unwrap().into_iter().map(|r| r.name).collect();
     assert_eq!(names, ["scenario2", "scenario3", "scenario5", "scenario13", "scenario16"]);

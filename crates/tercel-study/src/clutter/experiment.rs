@@ -2,14 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use tercel_neural::shipped::Models;
 use tercel_sim::clutter::Scenario;
 
 use super::methods::method;
-use super::score::{CURVES, METRICS, score};
+use super::score::{CURVES, CUTOFF, METRICS, score};
 use super::{Method, Recording, example, recovery};
 use crate::StudyError;
 use crate::monte_carlo::{Attempt, Curve, Example, Experiment, Plan, Quantity, Results};
 use crate::report::{Section, Table};
+use crate::studies::options_of;
 
 /// The seed of the published tables. It is reserved: nothing is tuned or trained on scenes of this seed.
 pub const SEED: u64 = 7919;
@@ -29,32 +31,18 @@ impl ClutterExperiment {
     ///
     /// # Errors
     /// When the scenario or a method is not known.
-    pub fn new(name: &str, seed: u64, runs: u64, methods: &[String]) -> Result<Self, StudyError> {
+    pub fn new(
+        name: &str,
+        seed: u64,
+        runs: u64,
+        methods: &[String],
+        models: &Models,
+    ) -> Result<Self, StudyError> {
         let scenario = Scenario::named(name)
             .ok_or_else(|| StudyError::Option(format!("there is no scenario `{name}`")))?;
-        let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            shown,
-        };
-        let curve = |(title, unit): (&str, &str)| Curve {
-            title: title.to_owned(),
-            unit: unit.to_owned(),
-            abscissa: "Time, s".to_owned(),
-            x: (0..scenario.steps()).map(|step| step as f64).collect(),
-            root: false,
-        };
-        let plan = Plan {
-            study: name.to_owned(),
-            seed,
-            runs,
-            options: BTreeMap::new(),
-            sweep: None,
-            methods: methods.to_vec(),
-            metrics: METRICS.map(quantity).to_vec(),
-            curves: CURVES.map(curve).to_vec(),
-        };
-        let methods = methods.iter().map(|name| method(name)).collect::<Result<_, _>>()?;
+        let times = (0..scenario.steps()).map(|step| step as f64);
+        let plan = plan_of(name, (seed, runs), options_of(models).collect(), methods, times);
+        let methods = methods.iter().map(|name| method(name, models)).collect::<Result<_, _>>()?;
         Ok(ClutterExperiment { plan, scenario, methods })
     }
 
@@ -72,7 +60,7 @@ impl Experiment for ClutterExperiment {
         let recording = self.recording(run);
         let steps = recording.scans.len() as u64;
         let attempt = |method: &dyn Method| {
-            Attempt::of(steps, || method.follow(&recording), |reported| score(&recording, &reported))
+            Attempt::of(steps, || method.follow(&recording), |reported| score(&recording, &reported, CUTOFF))
         };
         self.methods.iter().map(|method| attempt(&**method)).collect()
     }
@@ -99,11 +87,54 @@ impl Experiment for ClutterExperiment {
         if self.plan.runs == 0 {
             return Ok(None);
         }
-        let recording = self.recording(0);
-        let names = self.plan.methods.iter().zip(&self.methods);
-        let followed: Vec<_> = names
-            .filter_map(|(name, method)| Some((name.as_str(), method.follow(&recording).ok()?)))
-            .collect();
-        example::draw(&recording, format!("Scene 0 of {}", self.plan.study), &followed).map(Some)
+        let title = format!("Scene 0 of {}", self.plan.study);
+        drawn(&self.plan, &self.recording(0), &self.methods, &title)
     }
+}
+
+/// The plan of a study whose methods report the objects of scenes: seed and number of runs, options, methods, and the times of the
+/// scans.
+pub(crate) fn plan_of(
+    study: &str,
+    (seed, runs): (u64, u64),
+    options: BTreeMap<String, String>,
+    methods: &[String],
+    times: impl Iterator<Item = f64>,
+) -> Plan {
+    let times: Vec<f64> = times.collect();
+    let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        shown,
+    };
+    let curve = |(title, unit): (&str, &str)| Curve {
+        title: title.to_owned(),
+        unit: unit.to_owned(),
+        abscissa: "Time, s".to_owned(),
+        x: times.clone(),
+        root: false,
+    };
+    Plan {
+        study: study.to_owned(),
+        seed,
+        runs,
+        options,
+        sweep: None,
+        methods: methods.to_vec(),
+        metrics: METRICS.map(quantity).to_vec(),
+        curves: CURVES.map(curve).to_vec(),
+    }
+}
+
+/// A recording drawn with what every method made of it.
+pub(crate) fn drawn(
+    plan: &Plan,
+    recording: &Recording,
+    methods: &[Box<dyn Method>],
+    title: &str,
+) -> Result<Option<Example>, StudyError> {
+    let names = plan.methods.iter().zip(methods);
+    let followed: Vec<_> =
+        names.filter_map(|(name, method)| Some((name.as_str(), method.follow(recording).ok()?))).collect();
+    example::draw(recording, title.to_owned(), &followed).map(Some)
 }

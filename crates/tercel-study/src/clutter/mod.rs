@@ -9,6 +9,8 @@ mod score;
 pub mod tables;
 
 pub use experiment::{ClutterExperiment, SEED};
+pub(crate) use experiment::{drawn, plan_of};
 pub use recording::{Method, Recording, Reported, Tracked};
 pub use recovery::recovery;
+pub(crate) use score::score;
 pub use score::{CUTOFF, METRICS};

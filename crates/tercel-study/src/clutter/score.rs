@@ -12,9 +12,6 @@ use crate::monte_carlo::Outcome;
 /// Distance beyond which a track has nothing to do with an object, m.
 pub const CUTOFF: f64 = 100.0;
 
-/// Price of a switch of tracks in the trajectory metric, m.
-const SWITCH: f64 = 100.0;
-
 /// The scan from which on `gospa_settled` counts.
 pub(super) const SETTLED: usize = 40;
 
@@ -41,13 +38,13 @@ pub(super) const CURVES: [(&str, &str); 5] = [
     ("Number of objects over time", ""),
 ];
 
-/// Scores what a method reported.
-pub fn score(recording: &Recording, reported: &[Vec<Reported>]) -> Result<Outcome, String> {
-    figures(recording, reported).map_err(|error| error.to_string())
+/// Scores what a method reported, with this cut-off (m), which is also the price of a switch of tracks.
+pub fn score(recording: &Recording, reported: &[Vec<Reported>], cutoff: f64) -> Result<Outcome, String> {
+    figures(recording, reported, cutoff).map_err(|error| error.to_string())
 }
 
-fn figures(recording: &Recording, reported: &[Vec<Reported>]) -> Result<Outcome, FilterError> {
-    let metric = Gospa::new(CUTOFF, 1.0)?;
+fn figures(recording: &Recording, reported: &[Vec<Reported>], cutoff: f64) -> Result<Outcome, FilterError> {
+    let metric = Gospa::new(cutoff, 1.0)?;
     let mut curves = vec![Vec::with_capacity(reported.len()); CURVES.len()];
     let (mut errors, mut bias) = (0.0, 0.0);
     for (step, found) in reported.iter().enumerate() {
@@ -70,7 +67,7 @@ fn figures(recording: &Recording, reported: &[Vec<Reported>]) -> Result<Outcome,
     let scans = reported.len().max(1) as f64;
     let mean = |curve: &[f64]| curve.iter().sum::<f64>() / curve.len().max(1) as f64;
     let trajectories =
-        TrajectoryGospa::new(CUTOFF, 1.0, SWITCH)?.score(&truths(recording), &tracks(reported))?;
+        TrajectoryGospa::new(cutoff, 1.0, cutoff)?.score(&truths(recording), &tracks(reported))?;
     let metrics = vec![
         mean(&curves[0]),
         mean(&curves[1]),

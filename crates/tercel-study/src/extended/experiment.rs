@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use tercel_core::motion::Kinematics;
+use tercel_neural::shipped::Models;
 use tercel_sim::extended::{Generator, Heading, Sizes, Vehicle};
 
 use super::methods::method;
@@ -13,7 +14,7 @@ use super::{Aircraft, Method, Recording, Scene, example};
 use crate::StudyError;
 use crate::monte_carlo::{Attempt, Curve, Example, Experiment, Plan, Quantity};
 use crate::report::{Section, Table};
-use crate::studies::Request;
+use crate::studies::{Request, options_of};
 
 /// The seed of the published tables. It is reserved: nothing is tuned or trained on recordings of this seed.
 pub const SEED: u64 = 7919;
@@ -40,9 +41,10 @@ impl ExtendedExperiment {
         settings: &Settings,
         options: BTreeMap<String, String>,
         (seed, runs): (u64, u64),
-        names: &[String],
+        (names, models): (&[String], &Models),
     ) -> Result<Self, StudyError> {
-        let methods = names.iter().map(|name| method(study, name, settings)).collect::<Result<_, _>>()?;
+        let methods =
+            names.iter().map(|name| method(study, name, settings, models)).collect::<Result<_, _>>()?;
         let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
             name: name.to_owned(),
             unit: unit.to_owned(),
@@ -52,7 +54,7 @@ impl ExtendedExperiment {
             study: study.to_owned(),
             seed,
             runs,
-            options,
+            options: options.into_iter().chain(options_of(models)).collect(),
             sweep: None,
             methods: names.to_vec(),
             metrics: METRICS.map(quantity).to_vec(),
@@ -79,7 +81,14 @@ impl ExtendedExperiment {
         let mut options = request.options.clone();
         options.insert("set".to_owned(), request.set.to_owned());
         let drawn = (request.seed, request.runs);
-        Self::new("vehicle", Scene::Vehicle(vehicle), &settings, options, drawn, request.methods)
+        Self::new(
+            "vehicle",
+            Scene::Vehicle(vehicle),
+            &settings,
+            options,
+            drawn,
+            (request.methods, request.models),
+        )
     }
 
     /// The study `aircraft`.
@@ -104,7 +113,14 @@ impl ExtendedExperiment {
         let data = ("data".to_owned(), path.display().to_string());
         let drawn = (request.seed, request.runs.min(count));
         let scene = Scene::Aircraft(aircraft);
-        Self::new("aircraft", scene, &Settings::AIRCRAFT, [set, data].into(), drawn, request.methods)
+        Self::new(
+            "aircraft",
+            scene,
+            &Settings::AIRCRAFT,
+            [set, data].into(),
+            drawn,
+            (request.methods, request.models),
+        )
     }
 
     /// Whether the scenes are those of the publication, as far as it describes them.

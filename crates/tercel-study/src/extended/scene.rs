@@ -118,7 +118,8 @@ impl Aircraft {
             for step in 0..old.len() {
                 let around = &old[step.saturating_sub(SIDE)..(step + SIDE + 1).min(old.len())];
                 let velocity =
-                    around.iter().map(|state| state.zw()).sum::<Vector2<f64>>() / around.len() as f64;
+                    around.iter().map(|state| Vector2::new(state[2], state[3])).sum::<Vector2<f64>>()
+                        / around.len() as f64;
                 let before =
                     if step > 0 { track[step - 1].xy() + velocity * self.interval } else { old[0].xy() };
                 track[step] = Vector4::new(before.x, before.y, velocity.x, velocity.y);

@@ -56,12 +56,9 @@ impl Both {
         Self(detached(self.0))
     }
 
-    /// What the last measurement changed of the mean, and what is known after it, of each member.
-    pub fn corrected(&self) -> Vec<(Vector4<f64>, Gaussian<4>)> {
-        let of = |row: &[f32]| {
-            let [prior, posterior] = [gaussian(&row[..GAUSSIAN]), gaussian(&row[GAUSSIAN..])];
-            (posterior.mean - prior.mean, posterior)
-        };
+    /// What is known of each member before and after the last measurement.
+    pub fn pairs(&self) -> Vec<(Gaussian<4>, Gaussian<4>)> {
+        let of = |row: &[f32]| (gaussian(&row[..GAUSSIAN]), gaussian(&row[GAUSSIAN..]));
         values(&self.0).chunks_exact(2 * GAUSSIAN).map(of).collect()
     }
 }

@@ -11,6 +11,9 @@ const CONVERGED: f64 = 1e-6;
 /// Assignments of the surroundings of a row up to which these grow.
 const SURROUNDINGS: usize = 8192;
 
+/// Rows that compete with those of the surroundings by less, as the chance that both take one column, stay outside.
+const LEAST_PULL: f64 = 1e-5;
+
 /// Pairs of rows that want the same column, up to which the surroundings are looked at. A crowd beyond is no picture of
 /// objects, and would take long.
 const CROWD: usize = 1_000_000;
@@ -125,7 +128,7 @@ impl Region {
         let (mut next, mut events) = (Some(first), 1);
         while let Some(row) = next {
             let range = local.starts[row]..local.starts[row + 1];
-            events *= range.len() + 1;
+            events *= range.clone().filter(|&place| local.is_contested(&local.entries[place])).count() + 1;
             if events > SURROUNDINGS && row != first {
                 break;
             }
@@ -142,6 +145,7 @@ impl Region {
                 }
             }
             let outside = self.touched.iter().copied().filter(|&row| !self.inside[row]);
+            let outside = outside.filter(|&row| self.pull[row] >= LEAST_PULL);
             next = outside.max_by(|&a, &b| self.pull[a].total_cmp(&self.pull[b]).then(b.cmp(&a)));
         }
     }
@@ -153,6 +157,8 @@ impl Region {
         part.entries.clear();
         part.starts.clear();
         part.result.clear();
+        part.wanted.clear();
+        part.wanted.resize(local.columns, 0);
         (part.rows, part.columns) = (self.rows.len(), local.columns);
         for (number, &row) in self.rows.iter().enumerate() {
             part.starts.push(part.entries.len());
@@ -163,6 +169,7 @@ impl Region {
                     .filter(|&&other| !self.inside[local.entries[other].row])
                     .map(|&other| messages.to_column[other])
                     .sum();
+                part.wanted[column] += 1;
                 part.entries.push(Entry { row: number, column, weight: weight / (1.0 + claimed), place });
             }
         }

@@ -8,6 +8,10 @@ use crate::association::{KBest, Ranked};
 use crate::filter::Filter;
 use crate::multi::Scan;
 
+/// Hypotheses of a cluster, times its measurements, times its pairs: what following them all may cost. A crowd beyond, hundreds of
+/// measurements in one place, is no picture of objects and is followed by fewer hypotheses.
+const WORK: usize = 20_000_000;
+
 /// A cluster and what it may do with the measurements in its gates.
 pub(super) struct Growth<'a, B> {
     cluster: Cluster<B>,
@@ -89,6 +93,7 @@ impl<'a, B: Clone> Growth<'a, B> {
     /// The heaviest hypotheses after the scan, relative to the heaviest.
     fn children(&self, k_best: &mut KBest, cap: usize, prune: f64) -> Vec<Child> {
         let misses = vec![0.0; self.measurements.len()];
+        let mut affordable = WORK / (self.measurements.len() * self.candidates.len()).max(1);
         let mut children = Vec::new();
         let mut pairs = Vec::new();
         for (parent, hypothesis) in self.cluster.hypotheses.iter().enumerate() {
@@ -101,12 +106,13 @@ impl<'a, B: Clone> Growth<'a, B> {
             pairs.clear();
             let own = self.candidates.iter().filter(|c| hypothesis.leaves[c.tree] == Some(c.leaf));
             pairs.extend(own.map(|c| (self.row(c.measurement), c.tree, -c.ln_ratio)));
-            let wanted = (hypothesis.weight * cap as f64).ceil().max(1.0) as usize;
+            let wanted = ((hypothesis.weight * cap as f64).ceil() as usize).min(affordable).max(1);
             // All costs are finite and every measurement may stay alone, so there is always an answer.
             let Ok(found) = k_best.solve(&pairs, self.cluster.trees.len(), &misses, wanted, -prune.ln())
             else {
                 continue;
             };
+            affordable = affordable.saturating_sub(found.len());
             children.extend(found.iter().map(|Ranked { cost, columns }| Child {
                 ln_weight: ln_parent - cost,
                 parent,

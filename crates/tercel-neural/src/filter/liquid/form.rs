@@ -20,9 +20,11 @@ pub enum Form {
 /// that is.
 ///
 /// ## Definition
-/// With the velocity `v`, the last correction `c` of the state and the frame `R` of the heading (or of the state):
+/// With the velocity `v`, the last correction `c` of the state, the last [`surprise`] `s`, the [`widths`] `w` of the belief and the
+/// frame `R` of the heading (or of the state):
 /// ```text
-/// sees    |v| / velocity  (or v / velocity),   asinh(Rᵀ c / correction),   1 if there was a measurement, or 0
+/// sees    |v| / velocity  (or v / velocity),   asinh(Rᵀ c / correction),   asinh(Rᵀ s),   ln(w / correction),
+///         1 if there was a measurement, or 0
 /// says    o = Rᵀ (position, velocity), l = logarithms of variances, held within ±10 by 10 tanh(l / 10)
 /// dp = dt² / (2 interval²) acceleration interval² R o_p      dv = dt / interval · acceleration interval R o_v
 /// Q  = R [(dt²/4) q_v + q_p   (dt/2) q_v] Rᵀ                 q_v = noise² dt / interval · exp l_v
@@ -39,7 +41,7 @@ pub struct Residual {
     pub learned_noise: bool,
     /// Unit of velocities, m/s.
     pub velocity: f64,
-    /// Units of corrections of position and velocity, m and m/s.
+    /// Units of corrections and widths of position and velocity, m and m/s.
     pub correction: [f64; 2],
     /// Unit of what the network says, m/s².
     pub acceleration: f64,
@@ -86,6 +88,43 @@ pub struct Seen {
     pub correction: Vector4<f64>,
     /// Whether there was one.
     pub measured: bool,
+    /// How much they surprised.
+    pub surprise: Vector2<f64>,
+    /// How wide the belief is, m and m/s.
+    pub widths: [f64; 2],
+}
+
+/// How much measurements surprised, by the belief before and after them: the innovation in the plane, in its standard deviations.
+///
+/// ## Definition
+/// With the positions' means and covariances before (`p`, `P`) and after (`p'`, `P'`) an update by a position with innovation `ν` of
+/// covariance `S`, `p' - p = P S⁻¹ ν` and `P - P' = P S⁻¹ P`, so that whatever was measured
+/// ```text
+/// s = (P - P')^(-1/2) (p' - p)          |s|² = νᵀ S⁻¹ ν
+/// ```
+/// Zero where nothing was learned.
+pub fn surprise(before: &Gaussian<4>, after: &Gaussian<4>) -> Vector2<f64> {
+    let learned: Matrix2<f64> = (before.covariance - after.covariance).fixed_view::<2, 2>(0, 0).into_owned();
+    let correction = pair(&after.mean, 0) - pair(&before.mean, 0);
+    let (determinant, trace) = (learned.determinant(), learned.trace());
+    if !(determinant > 0.0 && trace > 0.0) {
+        return Vector2::zeros();
+    }
+    // The root of a positive matrix of two rows, and its inverse, in closed form.
+    let (root, length) = (determinant.sqrt(), (trace + 2.0 * determinant.sqrt()).sqrt());
+    let inverse =
+        Matrix2::new(learned[(1, 1)] + root, -learned[(0, 1)], -learned[(1, 0)], learned[(0, 0)] + root);
+    inverse * correction / (root * length)
+}
+
+/// How wide a belief is: the standard deviation of its position (m) and of its velocity (m/s), as the geometric mean over all
+/// directions.
+pub fn widths(belief: &Gaussian<4>) -> [f64; 2] {
+    let width = |first: usize| -> f64 {
+        let covariance: Matrix2<f64> = belief.covariance.fixed_view::<2, 2>(first, first).into_owned();
+        covariance.determinant().max(0.0).sqrt().sqrt()
+    };
+    [width(0), width(2)]
 }
 
 /// A prediction to first order.
@@ -162,7 +201,7 @@ fn pair(state: &Vector4<f64>, first: usize) -> Vector2<f64> {
 
 impl Residual {
     fn inputs(&self) -> usize {
-        if self.heading { 6 } else { 7 }
+        if self.heading { 10 } else { 11 }
     }
 
     /// Units of position and velocity residuals.
@@ -190,12 +229,15 @@ impl Residual {
             put(velocity.x / self.velocity, Vector2::x() / self.velocity);
             put(velocity.y / self.velocity, Vector2::y() / self.velocity);
         }
-        for (first, unit) in [(0, self.correction[0]), (2, self.correction[1])] {
-            let correction = pair(&seen.correction, first) / unit;
-            let (a, b) = (axes.along.dot(&correction), axes.across.dot(&correction));
+        let [place, velocity] = [0, 1].map(|i| pair(&seen.correction, 2 * i) / self.correction[i]);
+        for seen in [place, velocity, seen.surprise] {
+            let (a, b) = (axes.along.dot(&seen), axes.across.dot(&seen));
             let turn = axes.across * axes.rate;
             put(a.asinh(), turn * b / a.hypot(1.0));
             put(b.asinh(), -turn * a / b.hypot(1.0));
+        }
+        for (width, unit) in seen.widths.into_iter().zip(self.correction) {
+            put((width / unit).ln().clamp(-LIMIT, LIMIT), Vector2::zeros());
         }
         put(f64::from(u8::from(seen.measured)), Vector2::zeros());
     }

@@ -2,6 +2,7 @@
 
 mod form;
 mod hyper;
+mod motion;
 mod network;
 
 use std::sync::Arc;
@@ -15,8 +16,9 @@ use tercel_core::sensor::{Measurement, Sensor};
 
 use super::memory::share;
 
-pub use form::{Absolute, Form, Moved, Residual, Seen, Span};
+pub use form::{Absolute, Form, Moved, Residual, Seen, Span, surprise, widths};
 pub use hyper::{Derivative, LiquidHyper};
+pub use motion::{LiquidMemory, LiquidMotion};
 pub use network::{LiquidNetwork, Predictions};
 
 /// The kind of these models in their cards.
@@ -79,6 +81,7 @@ pub(super) const KIND: &str = "liquid";
 pub struct LiquidKalman<S, const M: usize = 2> {
     network: Arc<LiquidNetwork>,
     sensor: S,
+    speed: f64,
 }
 
 /// What a [`LiquidKalman`] knows of one object.
@@ -88,6 +91,9 @@ pub struct LiquidBelief {
     /// What the measurements of the present step changed, and whether there was one.
     correction: Vector4<f64>,
     measured: bool,
+    surprise: Vector2<f64>,
+    /// How wide the belief was after the last prediction or measurement, whatever mixing made of it since.
+    widths: [f64; 2],
     /// Predictions since birth.
     age: u32,
     memory: Vec<f32>,
@@ -103,7 +109,8 @@ impl LiquidBelief {
     }
 
     fn seen(&self) -> Seen {
-        Seen { mean: self.state.mean, correction: self.correction, measured: self.measured }
+        let LiquidBelief { correction, measured, surprise, widths, .. } = *self;
+        Seen { mean: self.state.mean, correction, measured, surprise, widths }
     }
 
     /// Moves the state, and forgets the corrections of the step that ends.
@@ -112,13 +119,14 @@ impl LiquidBelief {
         // What cannot be saved is reported by the next update.
         let _ = self.state.settle();
         (self.correction, self.measured) = (Vector4::zeros(), false);
+        (self.surprise, self.widths) = (Vector2::zeros(), widths(&self.state));
         self.age = self.age.saturating_add(1);
     }
 }
 
 impl PartialEq for LiquidBelief {
     fn eq(&self, other: &Self) -> bool {
-        let of = |belief: &Self| (belief.state, belief.correction, belief.measured, belief.age);
+        let of = |belief: &Self| (belief.state, belief.seen(), belief.age);
         of(self) == of(other) && self.memory == other.memory
     }
 }
@@ -131,6 +139,7 @@ impl Clone for LiquidBelief {
     fn clone_from(&mut self, source: &Self) {
         (self.state, self.correction) = (source.state, source.correction);
         (self.measured, self.age) = (source.measured, source.age);
+        (self.surprise, self.widths) = (source.surprise, source.widths);
         self.memory.clone_from(&source.memory);
     }
 }
@@ -138,7 +147,16 @@ impl Clone for LiquidBelief {
 impl<S, const M: usize> LiquidKalman<S, M> {
     /// A filter of this network and this sensor.
     pub fn new(network: Arc<LiquidNetwork>, sensor: S) -> Self {
-        LiquidKalman { network, sensor }
+        let speed = network.hyper().speed;
+        LiquidKalman { network, sensor, speed }
+    }
+
+    /// Sets the standard deviation of a new object's velocity, m/s per axis. That of the training is the default.
+    ///
+    /// # Errors
+    /// Unless it is positive and finite.
+    pub fn with_speed(self, speed: f64) -> Result<Self, FilterError> {
+        Ok(LiquidKalman { speed: FilterError::positive("speed of a new object", speed)?, ..self })
     }
 
     /// The network.
@@ -147,7 +165,7 @@ impl<S, const M: usize> LiquidKalman<S, M> {
     }
 
     fn motion(&self) -> ConstantVelocity {
-        ConstantVelocity::new(0.0).with_speed(self.network.hyper().speed)
+        ConstantVelocity::new(0.0).with_speed(self.speed)
     }
 
     /// The filter that updates and compares. Its motion is not used.
@@ -187,10 +205,13 @@ impl<const M: usize, S: Sensor<4, M>> Filter<4> for LiquidKalman<S, M> {
     type Measurement = Measurement<M>;
 
     fn birth(&self, measurement: &Measurement<M>) -> Result<LiquidBelief, FilterError> {
+        let state = self.sensor.birth(measurement, &Motion::<4>::prior(&self.motion()))?;
         Ok(LiquidBelief {
-            state: self.sensor.birth(measurement, &Motion::<4>::prior(&self.motion()))?,
+            state,
             correction: Vector4::zeros(),
             measured: true,
+            surprise: Vector2::zeros(),
+            widths: widths(&state),
             age: 0,
             memory: vec![0.0; self.network.memory()],
             room: Vec::new(),
@@ -208,9 +229,11 @@ impl<const M: usize, S: Sensor<4, M>> Filter<4> for LiquidKalman<S, M> {
         belief: &mut LiquidBelief,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
-        let before = belief.state.mean;
+        let before = belief.state;
         let innovation = self.classical().update(&mut belief.state, measurement)?;
-        belief.correction += belief.state.mean - before;
+        belief.correction += belief.state.mean - before.mean;
+        belief.surprise += surprise(&before, &belief.state);
+        belief.widths = widths(&belief.state);
         belief.measured = true;
         Ok(innovation)
     }
@@ -235,6 +258,10 @@ impl<const M: usize, S: Sensor<4, M>> Filter<4> for LiquidKalman<S, M> {
         belief.state.merge(weight, &other.state, other_weight);
         let share = share(weight, other_weight);
         belief.correction += (other.correction - belief.correction) * share;
+        belief.surprise += (other.surprise - belief.surprise) * share;
+        for (ours, theirs) in belief.widths.iter_mut().zip(other.widths) {
+            *ours += (theirs - *ours) * share;
+        }
         for (ours, theirs) in belief.memory.iter_mut().zip(&other.memory) {
             *ours += share as f32 * (theirs - *ours);
         }

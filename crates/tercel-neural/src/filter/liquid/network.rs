@@ -25,8 +25,16 @@ pub struct LiquidNetwork {
 #[derive(Debug)]
 pub struct Predictions<'a> {
     network: &'a LiquidNetwork,
+    layout: Layout,
     span: Span,
     batch: Batch<'a>,
+}
+
+/// Rows of an object, and directions of derivatives through the network.
+#[derive(Debug, Clone, Copy)]
+struct Layout {
+    copies: usize,
+    directions: usize,
 }
 
 /// Rows of objects. Those of an object that is moved for differences lie below its own.
@@ -66,12 +74,12 @@ impl LiquidNetwork {
         if self.hyper.carried { self.cell.size() } else { 0 }
     }
 
-    /// Rows of an object, and directions of derivatives through the network.
-    fn rows_and_directions(&self) -> [usize; 2] {
+    /// How the rows lie when Jacobians are asked for.
+    fn layout(&self) -> Layout {
         let directions = self.hyper.form.directions().len();
         match self.hyper.jacobian {
-            Derivative::Exact => [1, directions],
-            Derivative::Difference { .. } => [1 + directions, 0],
+            Derivative::Exact => Layout { copies: 1, directions },
+            Derivative::Difference { .. } => Layout { copies: 1 + directions, directions: 0 },
         }
     }
 
@@ -88,8 +96,33 @@ impl LiquidNetwork {
         dt: f64,
         room: &'a mut Vec<f32>,
     ) -> Predictions<'a> {
+        self.ask(self.layout(), count, objects, dt, room)
+    }
+
+    /// As [`predict`](LiquidNetwork::predict), for those who need no Jacobian: theirs is that of outputs that stay.
+    ///
+    /// # Panics
+    /// As [`predict`](LiquidNetwork::predict).
+    pub fn predict_means<'a, 'm>(
+        &'a self,
+        count: usize,
+        objects: impl Iterator<Item = (Seen, &'m [f32])>,
+        dt: f64,
+        room: &'a mut Vec<f32>,
+    ) -> Predictions<'a> {
+        self.ask(Layout { copies: 1, directions: 0 }, count, objects, dt, room)
+    }
+
+    fn ask<'a, 'm>(
+        &'a self,
+        layout: Layout,
+        count: usize,
+        objects: impl Iterator<Item = (Seen, &'m [f32])>,
+        dt: f64,
+        room: &'a mut Vec<f32>,
+    ) -> Predictions<'a> {
         let (form, size) = (&self.hyper.form, self.cell.size());
-        let [copies, directions] = self.rows_and_directions();
+        let Layout { copies, directions } = layout;
         let (inputs, outputs, rows) = (form.inputs(), form.outputs(), count * copies);
         let scratch = self.cell.scratch(rows, directions);
         let needed = rows * (1 + directions) * (inputs + size + outputs) + scratch;
@@ -106,16 +139,21 @@ impl LiquidNetwork {
             outputs: take(outputs),
             output_tangents: take(directions * outputs),
         };
-        self.see(objects, &mut batch);
+        self.see(layout, objects, &mut batch);
         let span = Span { dt, interval: self.hyper.interval };
         self.step((dt / span.interval) as f32, directions, &mut batch, room.0);
-        Predictions { network: self, span, batch }
+        Predictions { network: self, layout, span, batch }
     }
 
     /// Fills in what the network sees and remembers.
-    fn see<'m>(&self, objects: impl Iterator<Item = (Seen, &'m [f32])>, batch: &mut Batch<'_>) {
+    fn see<'m>(
+        &self,
+        layout: Layout,
+        objects: impl Iterator<Item = (Seen, &'m [f32])>,
+        batch: &mut Batch<'_>,
+    ) {
         let (form, size) = (&self.hyper.form, self.cell.size());
-        let [copies, directions] = self.rows_and_directions();
+        let Layout { copies, directions } = layout;
         let inputs = form.inputs();
         for (number, (seen, remembered)) in objects.enumerate() {
             for copy in 0..copies {
@@ -157,9 +195,8 @@ impl Predictions<'_> {
     /// # Panics
     /// When there is no object of this number.
     pub fn get(&self, number: usize, seen: &Seen) -> Option<(Moved, &[f32])> {
-        let Predictions { network, batch, span } = self;
+        let Predictions { network, layout: Layout { copies, directions }, batch, span } = self;
         let form = &network.hyper.form;
-        let [copies, directions] = network.rows_and_directions();
         let outputs = form.outputs();
         let said = &batch.outputs[number * copies * outputs..][..copies * outputs];
         let tangents = &batch.output_tangents[number * directions * outputs..][..directions * outputs];
@@ -168,7 +205,7 @@ impl Predictions<'_> {
             return None;
         }
         let mut moved = form.moved(seen, &said[..outputs], tangents, *span);
-        if let Derivative::Difference { step } = network.hyper.jacobian {
+        if let (Derivative::Difference { step }, 2..) = (network.hyper.jacobian, *copies) {
             for (copy, said) in said.chunks_exact(outputs).enumerate().skip(1) {
                 let seen = Seen { mean: network.displaced(&seen.mean, copy), ..*seen };
                 let there = form.moved(&seen, said, &[], *span).mean;

@@ -6,6 +6,7 @@ use tercel_core::filter::{Transition, TurnBank};
 use tercel_core::motion::AccelerationNoise;
 
 use crate::error::ModelError;
+use crate::filter::checked_positive;
 use crate::layer::LayerShape;
 use crate::model::Model;
 
@@ -15,7 +16,10 @@ use crate::model::Model;
 /// rates = [0.0, 0.1, -0.1]        # turn rates of the bank, rad/s
 /// accelerations = [7.0, 14.0]     # standard deviations, constant within a step, m/s²
 /// stay = 0.985                    # probability of the same turn rate after a second
+/// noise_stay = 1.0                # probability of the same acceleration after a second
 /// speed = 300.0                   # standard deviation of a new object's velocity, m/s per axis
+/// heading = false                 # whether the network looks along the heading, or along the line of sight
+/// unit = 1.0                      # what the network takes for a metre, m
 /// input = 64                      # width of the first layer
 /// hidden = 64                     # width of each recurrent layer
 /// layers = 1                      # recurrent layers
@@ -37,8 +41,19 @@ pub struct NeuralImmHyper {
     pub accelerations: Vec<f64>,
     /// Probability of keeping the turn rate over a second.
     pub stay: f64,
+    /// Probability of keeping the acceleration over a second.
+    #[serde(default = "one")]
+    pub noise_stay: f64,
     /// Standard deviation of a new object's velocity, m/s per axis.
     pub speed: f64,
+    /// Whether the network looks along the heading of the object, as suits a sensor of positions, or along the line of sight from
+    /// the sensor.
+    #[serde(default)]
+    pub heading: bool,
+    /// What the network takes for a metre, m: its inputs are made for aircraft far from a radar, and slower objects that are seen
+    /// better look like those when they are measured with a shorter rule.
+    #[serde(default = "one")]
+    pub unit: f64,
     /// Width of the first layer.
     pub input: usize,
     /// Width of each recurrent layer.
@@ -54,12 +69,19 @@ impl Default for NeuralImmHyper {
             rates: (-10..=10).map(|i| f64::from(2 * i).to_radians()).collect(),
             accelerations: vec![7.0, 14.0],
             stay: 0.985,
+            noise_stay: 1.0,
             speed: 300.0,
+            heading: false,
+            unit: 1.0,
             input: 64,
             hidden: 64,
             layers: 1,
         }
     }
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Inputs of the network beside two for each turn rate.
@@ -82,7 +104,14 @@ impl NeuralImmHyper {
         TurnBank::new(self.rates.iter().copied())?
             .with_speed(speed)
             .with_transition(Transition::sticky(self.stay).per(1.0))
+            .with_noise_transition(self.noise_transition())
             .with_noises(self.accelerations.iter().map(|value| AccelerationNoise::Piecewise(*value)))
+    }
+
+    fn noise_transition(&self) -> Transition {
+        let stay = Transition::sticky(self.noise_stay);
+        // One that never changes needs no roots of it.
+        if self.noise_stay < 1.0 { stay.per(1.0) } else { stay }
     }
 
     /// Width of an input row of the network.
@@ -127,6 +156,7 @@ impl NeuralImmHyper {
     /// Names the option, what it is and what was expected.
     pub fn check(&self) -> Result<(), String> {
         self.bank().map_err(|error| error.to_string())?;
+        checked_positive(&[("unit", self.unit)])?;
         for (name, size) in [("input", self.input), ("hidden", self.hidden), ("layers", self.layers)] {
             if !(1..=1 << 16).contains(&size) {
                 return Err(format!("`{name}` is {size}; expected 1 to 65536"));

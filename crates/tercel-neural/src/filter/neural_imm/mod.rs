@@ -201,7 +201,8 @@ where
 {
     fn look(&self, belief: &mut NeuralImmBelief) {
         let (modes, state) = (self.filter.mode_probabilities(&belief.bank), self.filter.state(&belief.bank));
-        belief.outlook.look(&self.bank, &belief.bank, modes, state, &self.origin);
+        let origin = (!self.network.hyper().heading).then_some(&self.origin);
+        belief.outlook.look(&self.bank, &belief.bank, modes, state, origin);
     }
 
     /// Where a measurement puts the object, the covariance of its error, and how unsure the bank is of the latter: the standard
@@ -246,25 +247,27 @@ where
         let spread = |root: &Matrix4<f64>, row: usize| root.row(row).norm().max(1e-9);
         let expected = |row: usize| spread(prior, row).hypot(noise[(row, row)].max(0.0).sqrt());
         let velocity = outlook.turned(&outlook.state().mean);
+        let metre = self.network.hyper().unit;
         let ln = |value: f64, unit: f64| (value.max(1e-9 * unit) / unit).ln();
+        let length = |value: f64, unit: f64| ln(value, unit * metre);
         let features = [
             (off[0] / expected(0)).asinh(),
             (off[1] / expected(1)).asinh(),
             nis.max(0.0).ln_1p(),
-            0.5 * ln(noise[(0, 0)], 50.0 * 50.0),
-            0.5 * ln(noise[(1, 1)], 1e6),
-            ln(spread(posterior, 0), 100.0),
-            ln(spread(posterior, 1), 300.0),
-            ln(spread(posterior, 2), 50.0),
-            ln(spread(posterior, 3), 50.0),
-            ln(spread(prior, 1), 300.0),
-            velocity[2] / 300.0,
-            velocity[3] / 300.0,
-            ln(velocity[2].hypot(velocity[3]), 300.0),
-            ln(outlook.range(), 100e3),
+            length(noise[(0, 0)].max(0.0).sqrt(), 50.0),
+            length(noise[(1, 1)].max(0.0).sqrt(), 1e3),
+            length(spread(posterior, 0), 100.0),
+            length(spread(posterior, 1), 300.0),
+            length(spread(posterior, 2), 50.0),
+            length(spread(posterior, 3), 50.0),
+            length(spread(prior, 1), 300.0),
+            velocity[2] / (300.0 * metre),
+            velocity[3] / (300.0 * metre),
+            length(velocity[2].hypot(velocity[3]), 300.0),
+            length(outlook.range(), 100e3),
             ln(*waited, 1.0),
             unsure,
-            outlook.acceleration() / 10.0 - 1.0,
+            outlook.acceleration() / (10.0 * metre) - 1.0,
         ];
         let shares = before.probabilities().iter().chain(outlook.probabilities());
         let shares = shares.map(|share| (share.ln().max(-12.0) + 4.0) / 4.0);

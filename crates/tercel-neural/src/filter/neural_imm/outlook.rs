@@ -5,7 +5,8 @@ use tercel_core::belief::{Cholesky, Gaussian};
 use tercel_core::filter::{ImmBelief, TurnBank};
 
 /// Mean, spread and turn rates of a bank, in the frame of the line of sight: its first axis points from the sensor to the
-/// mean position, the second a quarter turn to the left.
+/// mean position, the second a quarter turn to the left. Where the network looks along the heading, that takes the place of the line
+/// of sight, and the speed that of the range.
 ///
 /// Positions are relative to the mean of the bank; units are m and m/s.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,18 +39,22 @@ impl Outlook {
         }
     }
 
-    /// Takes in what the bank believes now. `modes` are the probabilities of its modes, `state` the moments of all.
+    /// Takes in what the bank believes now. `modes` are the probabilities of its modes, `state` the moments of all. Without an origin
+    /// the frame is that of the heading.
     pub(super) fn look(
         &mut self,
         bank: &TurnBank,
         belief: &ImmBelief<Gaussian<4>, 4>,
         modes: &[f64],
         state: Gaussian<4>,
-        origin: &Vector2<f64>,
+        origin: Option<&Vector2<f64>>,
     ) {
         let rates = self.probabilities.len();
         self.state = state;
-        let away = Vector2::new(state.mean[0], state.mean[1]) - origin;
+        let away = match origin {
+            Some(origin) => state.mean.xy() - origin,
+            None => Vector2::new(state.mean[2], state.mean[3]),
+        };
         self.range = away.norm();
         // On top of the sensor there is no line of sight.
         let seen = self.range > 0.0 && self.range.is_finite();

@@ -8,11 +8,12 @@ use tercel_core::error::FilterError;
 use tercel_core::filter::Filter;
 use tercel_core::motion::{AccelerationNoise, Turn};
 use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing, Sensor};
+use tercel_neural::Model;
 use tercel_neural::filter::{
     BankNetwork, DeepMtt, EnsKNets, EnsKNetsHyper, EnsembleNetwork, GainNetwork, KalmanNet, MnemonicKalman,
     MnemonicNetwork, NeuralImm, OfflineEnsKNets, ResidualNetwork, TrMtt, TransformerNetwork,
 };
-use tercel_neural::{Model, shipped};
+use tercel_neural::shipped::Models;
 
 use super::bank::{ADAPTIVE_BEARINGS, Bank, NOMINAL};
 use super::{Plot, follow, stated};
@@ -68,21 +69,21 @@ fn published_sensor() -> Result<tercel_core::sensor::Position, FilterError> {
 }
 
 /// `imm-wide`: the bank of `neural-imm` without its network, which tells what the network adds.
-pub(super) fn wide_bank() -> Result<Bank, StudyError> {
-    let network = BankNetwork::from_model(&shipped::model("neural-imm")?)?;
+pub(super) fn wide_bank(models: &Models) -> Result<Bank, StudyError> {
+    let network = BankNetwork::from_model(&models.get("neural-imm")?)?;
     Ok(Bank::new(network.hyper().bank()?)?)
 }
 
 /// `neural-imm`: told the accuracy of the radar.
-pub(super) fn neural_imm() -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(BankNetwork::from_model(&shipped::model("neural-imm")?)?);
+pub(super) fn neural_imm(models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(BankNetwork::from_model(&models.get("neural-imm")?)?);
     let filter = NeuralImm::new(network, &[radar()?])?;
     Ok(Box::new(Learned { filter, measure: stated, read: read_bank }))
 }
 
 /// `neural-imm-adaptive`: told nothing, it chooses among the accuracies of `imm-adaptive`.
-pub(super) fn neural_imm_adaptive() -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(BankNetwork::from_model(&shipped::model("neural-imm")?)?);
+pub(super) fn neural_imm_adaptive(models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(BankNetwork::from_model(&models.get("neural-imm")?)?);
     let radars = ADAPTIVE_BEARINGS.map(|degrees| RangeBearing::new(NOMINAL.0, degrees.to_radians()));
     let radars = radars.into_iter().collect::<Result<Vec<_>, _>>()?;
     let filter = NeuralImm::new(network, &radars)?;
@@ -102,23 +103,23 @@ fn straight() -> Turn {
 }
 
 /// `kalman-net`: architecture #2, with converted plots of stated accuracy.
-pub(super) fn kalman_net() -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(GainNetwork::from_model(&shipped::model("kalman-net-straight")?)?);
+pub(super) fn kalman_net(models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(GainNetwork::from_model(&models.get("kalman-net-straight")?)?);
     let filter = KalmanNet::new(network, straight(), ConvertedPolar::new(NOMINAL.0, NOMINAL.1)?);
     Ok(Box::new(Learned { filter, measure: stated, read: moments }))
 }
 
 /// `kalman-net-paper`: architecture #1 as published.
-pub(super) fn kalman_net_paper() -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(GainNetwork::from_model(&shipped::model("kalman-net-straight-paper")?)?);
+pub(super) fn kalman_net_paper(models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(GainNetwork::from_model(&models.get("kalman-net-straight-paper")?)?);
     let filter = KalmanNet::new(network, straight(), published_sensor()?);
     let measure = |plot: &Plot, _: &Recording| published_position(plot);
     Ok(Box::new(Learned { filter, measure, read: mean }))
 }
 
 /// `att-ens-kalmannets`: our default of the ensemble, with converted plots of stated accuracy.
-pub(super) fn ensemble(model: &str) -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(EnsembleNetwork::from_model(&shipped::model(model)?)?);
+pub(super) fn ensemble(models: &Models, model: &str) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(EnsembleNetwork::from_model(&models.get(model)?)?);
     let filter = EnsKNets::new(network, ConvertedPolar::new(NOMINAL.0, NOMINAL.1)?)?;
     Ok(Box::new(Learned { filter, measure: stated, read: read_ensemble }))
 }
@@ -136,14 +137,14 @@ pub(super) struct PublishedEnsemble {
 }
 
 impl PublishedEnsemble {
-    pub fn new(model: &str) -> Result<Self, StudyError> {
-        let network = Arc::new(EnsembleNetwork::from_model(&shipped::model(model)?)?);
+    pub fn new(models: &Models, model: &str) -> Result<Self, StudyError> {
+        let network = Arc::new(EnsembleNetwork::from_model(&models.get(model)?)?);
         Ok(PublishedEnsemble { filter: OfflineEnsKNets::new(network, published_sensor()?)? })
     }
 
     /// The KalmanNets of the published ensembles without their branches: the mean of their states.
-    pub fn average() -> Result<Self, StudyError> {
-        let whole = shipped::model("att-ens-kalmannets-paper")?;
+    pub fn average(models: &Models) -> Result<Self, StudyError> {
+        let whole = models.get("att-ens-kalmannets-paper")?;
         let network = EnsembleNetwork::from_model(&whole)?;
         let hyper = EnsKNetsHyper {
             attention: None,
@@ -179,20 +180,20 @@ impl Method for PublishedEnsemble {
 }
 
 /// `mnemonic`.
-pub(super) fn mnemonic() -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(MnemonicNetwork::from_model(&shipped::model("mnemonic")?)?);
+pub(super) fn mnemonic(models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(MnemonicNetwork::from_model(&models.get("mnemonic")?)?);
     Ok(Box::new(Learned { filter: MnemonicKalman::new(network, radar()?), measure: stated, read: moments }))
 }
 
 /// `deep-mtt`: the last estimate of each window.
-pub(super) fn deep_mtt() -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(ResidualNetwork::from_model(&shipped::model("deep-mtt")?)?);
+pub(super) fn deep_mtt(models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(ResidualNetwork::from_model(&models.get("deep-mtt")?)?);
     Ok(Box::new(Learned { filter: DeepMtt::new(network, radar()?), measure: stated, read: moments }))
 }
 
 /// `tr-mtt`: the last estimate of each window.
-pub(super) fn tr_mtt() -> Result<Box<dyn Method>, StudyError> {
-    let network = Arc::new(TransformerNetwork::from_model(&shipped::model("tr-mtt")?)?);
+pub(super) fn tr_mtt(models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    let network = Arc::new(TransformerNetwork::from_model(&models.get("tr-mtt")?)?);
     Ok(Box::new(Learned { filter: TrMtt::new(network, radar()?), measure: stated, read: moments }))
 }
 
@@ -205,8 +206,8 @@ pub(super) struct Windowed {
 const STRIDE: usize = 5;
 
 impl Windowed {
-    pub fn new() -> Result<Self, StudyError> {
-        let network = Arc::new(TransformerNetwork::from_model(&shipped::model("tr-mtt")?)?);
+    pub fn new(models: &Models) -> Result<Self, StudyError> {
+        let network = Arc::new(TransformerNetwork::from_model(&models.get("tr-mtt")?)?);
         Ok(Windowed { filter: TrMtt::new(network, radar()?) })
     }
 }

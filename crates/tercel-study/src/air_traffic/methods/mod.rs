@@ -32,6 +32,7 @@ mod single;
 use tercel_core::error::FilterError;
 use tercel_core::filter::Filter;
 use tercel_core::sensor::Measurement;
+use tercel_neural::shipped::Models;
 use tercel_sim::air_traffic::AirTraffic;
 
 use super::{Method, Recording, StepEstimate};
@@ -75,7 +76,7 @@ pub const ABLATION: [&str; 5] = [
 ///
 /// # Errors
 /// When there is no such method.
-pub fn method(name: &str, population: &AirTraffic) -> Result<Box<dyn Method>, StudyError> {
+pub fn method(name: &str, population: &AirTraffic, models: &Models) -> Result<Box<dyn Method>, StudyError> {
     Ok(match name {
         "measurement" => Box::new(limits::Measured),
         "ekf" => Box::new(single::StraightExtended),
@@ -83,21 +84,21 @@ pub fn method(name: &str, population: &AirTraffic) -> Result<Box<dyn Method>, St
         "imm-paper" => Box::new(bank::Published::new()?),
         "imm" => Box::new(Bank::shipped()?),
         "imm-adaptive" => Box::new(AdaptiveBank::shipped()?),
-        "imm-wide" => Box::new(learned::wide_bank()?),
-        "neural-imm" => learned::neural_imm()?,
-        "neural-imm-adaptive" => learned::neural_imm_adaptive()?,
-        "kalman-net" => learned::kalman_net()?,
-        "kalman-net-paper" => learned::kalman_net_paper()?,
-        "att-ens-kalmannets" => learned::ensemble("att-ens-kalmannets")?,
+        "imm-wide" => Box::new(learned::wide_bank(models)?),
+        "neural-imm" => learned::neural_imm(models)?,
+        "neural-imm-adaptive" => learned::neural_imm_adaptive(models)?,
+        "kalman-net" => learned::kalman_net(models)?,
+        "kalman-net-paper" => learned::kalman_net_paper(models)?,
+        "att-ens-kalmannets" => learned::ensemble(models, "att-ens-kalmannets")?,
         "ens-knets-classification-paper"
         | "ens-knets-correction-paper"
         | "ens-knets-paper"
-        | "att-ens-kalmannets-paper" => Box::new(learned::PublishedEnsemble::new(name)?),
-        "mnemonic" => learned::mnemonic()?,
-        "deep-mtt" => learned::deep_mtt()?,
-        "tr-mtt" => learned::tr_mtt()?,
-        "tr-mtt-window" => Box::new(learned::Windowed::new()?),
-        "average-paper" => Box::new(learned::PublishedEnsemble::average()?),
+        | "att-ens-kalmannets-paper" => Box::new(learned::PublishedEnsemble::new(models, name)?),
+        "mnemonic" => learned::mnemonic(models)?,
+        "deep-mtt" => learned::deep_mtt(models)?,
+        "tr-mtt" => learned::tr_mtt(models)?,
+        "tr-mtt-window" => Box::new(learned::Windowed::new(models)?),
+        "average-paper" => Box::new(learned::PublishedEnsemble::average(models)?),
         "bayes" => Box::new(limits::Bayes::new(population.clone())),
         "oracle" => Box::new(limits::Oracle),
         _ => {

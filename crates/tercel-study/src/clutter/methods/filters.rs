@@ -1,12 +1,18 @@
 //! The filters that the methods put into trackers.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix4, Vector4};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Imm, JumpMarkov, Kalman, Particle, Transition};
+use tercel_core::filter::{Either, Extended, Imm, JumpMarkov, Kalman, Particle, Transition};
 use tercel_core::motion::{ConstantVelocity, LinearMotion, Motion, Turn};
 use tercel_core::sensor::Position;
+use tercel_neural::filter::{BankNetwork, LiquidKalman, LiquidMotion, LiquidNetwork, NeuralImm};
+use tercel_neural::shipped::Models;
 use tercel_sim::clutter::Sensor;
+
+use crate::error::StudyError;
 
 /// Standard deviation of a new object's velocity, m/s per axis.
 const SPEED: f64 = 20.0;
@@ -44,6 +50,71 @@ pub(super) fn cloud(sensor: &Sensor) -> Result<Particle<JumpMarkov<Turn>, Positi
     let mode = |(rate, density): (f64, f64)| Turn::new(rate.to_radians(), density).with_speed(SPEED);
     let motion = JumpMarkov::new(BANK.map(mode), Transition::sticky(STAY).per(1.0))?;
     Particle::new(motion, Position::new(sensor.deviation)?, PARTICLES, 1)?.with_smoothing(0.2)
+}
+
+fn network(models: &Models, model: &str) -> Result<Arc<LiquidNetwork>, StudyError> {
+    Ok(Arc::new(LiquidNetwork::from_model(&models.get(model)?)?))
+}
+
+/// A learned motion; one model serves all scenes.
+pub(super) fn liquid(
+    models: &Models,
+    model: &str,
+) -> Result<impl Fn(&Sensor) -> Result<LiquidKalman<Position<2>>, FilterError> + use<>, StudyError> {
+    let network = network(models, model)?;
+    Ok(move |sensor: &Sensor| {
+        LiquidKalman::new(network.clone(), Position::new(sensor.deviation)?).with_speed(SPEED)
+    })
+}
+
+/// A bank of turns whose estimate a network corrects.
+pub(super) fn neural(
+    models: &Models,
+) -> Result<impl Fn(&Sensor) -> Result<NeuralImm<Position<2>>, FilterError> + use<>, StudyError> {
+    let network = Arc::new(BankNetwork::from_model(&models.get("neural-imm-position")?)?);
+    Ok(move |sensor: &Sensor| NeuralImm::new(network.clone(), &[Position::new(sensor.deviation)?]))
+}
+
+/// A bank of turns alone.
+type Turns = Imm<Extended<Turn, Position<2>>>;
+
+/// The bank of [`neural`] without its network, which tells what the network adds.
+pub(super) fn wide(
+    models: &Models,
+) -> Result<impl Fn(&Sensor) -> Result<Turns, FilterError> + use<>, StudyError> {
+    let bank = BankNetwork::from_model(&models.get("neural-imm-position")?)?.hyper().bank()?;
+    Ok(move |sensor: &Sensor| bank.filter(Position::new(sensor.deviation)?))
+}
+
+/// A learned motion beside the modes of [`BANK`].
+type Mode = Either<Kalman<Turn, Position<2>>, LiquidKalman<Position<2>>>;
+
+/// The modes of [`BANK`] and a learned motion as one more.
+pub(super) fn liquid_bank(
+    models: &Models,
+    model: &str,
+) -> Result<impl Fn(&Sensor) -> Result<Imm<Mode>, FilterError> + use<>, StudyError> {
+    let network = network(models, model)?;
+    Ok(move |sensor: &Sensor| {
+        let radar = Position::new(sensor.deviation)?;
+        let turn = |(rate, density): (f64, f64)| Turn::new(rate.to_radians(), density).with_speed(SPEED);
+        let modes = BANK.map(|mode| Either::Left(Kalman::new(turn(mode), radar)));
+        let learned = Either::Right(LiquidKalman::new(network.clone(), radar).with_speed(SPEED)?);
+        Imm::new(modes.into_iter().chain([learned]), Transition::sticky(STAY).per(1.0))
+    })
+}
+
+/// The same motion, of particles. The copies of resampling are spread as in [`cloud`].
+pub(super) fn liquid_cloud(
+    models: &Models,
+    model: &str,
+) -> Result<impl Fn(&Sensor) -> Result<Particle<LiquidMotion, Position<2>>, FilterError> + use<>, StudyError>
+{
+    let network = network(models, model)?;
+    Ok(move |sensor: &Sensor| {
+        let motion = LiquidMotion::new(network.clone()).with_speed(SPEED)?;
+        Particle::new(motion, Position::new(sensor.deviation)?, PARTICLES, 1)?.with_smoothing(0.2)
+    })
 }
 
 /// The published modes: straight, a turn to the left at 10 °/s, the acceleration of the second scene, with the published

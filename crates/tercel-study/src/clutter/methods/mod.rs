@@ -1,15 +1,26 @@
 //! The methods that the clutter studies compare: filters in trackers.
 //!
-//! | method | filter | tracker |
-//! |---|---|---|
-//! | `gm-phd` | one straight motion | [`Phd`](tercel_core::multi::Phd) |
-//! | `imm-phd-paper` | the three modes of the publication with its transitions and noises, the acceleration known | `Phd` |
-//! | `imm-phd` | ours: straight, turns at ±5 and ±10 °/s, agile | `Phd` |
-//! | `imm-member` | the same | [`MultiBernoulli`](tercel_core::multi::MultiBernoulli) |
-//! | `smc-imm-phd`, `smc-imm-member` | the same modes, 500 particles that jump between them | `Phd`, `MultiBernoulli` |
-//! | `imm-jpda-paper` | the modes of the publication | [`Jpda`](tercel_core::multi::Jpda), confirmed by three hits |
-//! | `imm-jpda` | ours | `Jpda` |
-//! | `imm-pmbm` | ours | [`Pmbm`](tercel_core::multi::Pmbm) |
+//! A method is a filter in a tracker, `filter-tracker`:
+//!
+//! | filter | what it is |
+//! |---|---|
+//! | `gm` | one straight motion |
+//! | `imm` | ours: straight, turns at ±5 and ±10 °/s, agile |
+//! | `imm..-paper` | the three modes of the publication with its transitions and noises, the acceleration known |
+//! | `lnn` | motion learned by a liquid network: [`LiquidKalman`](tercel_neural::filter::LiquidKalman) |
+//! | `lnn..-paper` | the same as published: no memory, fixed noise |
+//! | `gru`, `mlp` | controls of the same size: gated units, and no memory |
+//! | `lnn-imm` | the modes of `imm` and the learned motion as one more |
+//! | `smc-imm`, `smc-lnn` | the modes of `imm`, and the learned motion, with 500 particles |
+//! | `neural` | a wide bank of turns whose estimate a network corrects: [`NeuralImm`](tercel_neural::filter::NeuralImm) |
+//! | `wide` | that bank without its network |
+//!
+//! | tracker | |
+//! |---|---|
+//! | `phd` | [`Phd`](tercel_core::multi::Phd) |
+//! | `member` | [`MultiBernoulli`](tercel_core::multi::MultiBernoulli) |
+//! | `jpda` | [`Jpda`](tercel_core::multi::Jpda); as `-paper` confirmed by three hits |
+//! | `pmbm` | [`Pmbm`](tercel_core::multi::Pmbm) |
 //!
 //! The suffix `-paper` is the configuration of the publication, as far as it is stated; a plain name is what we would fly. One
 //! configuration serves every scenario. All know the accuracy of the sensor, its detection probability and the density of
@@ -18,39 +29,83 @@
 //! A further method is a further pair: [`Tracked`] takes any filter of four components and any tracker.
 
 mod filters;
-mod trackers;
+pub(crate) mod trackers;
 
 use super::{Method, Tracked};
+use tercel_neural::shipped::Models;
+
 use crate::error::StudyError;
 
 /// Names of all methods, in the order in which they are best read.
-pub const METHODS: [&str; 9] = [
+pub const METHODS: [&str; 27] = [
     "gm-phd",
     "imm-phd-paper",
+    "lnn-phd-paper",
     "imm-phd",
+    "lnn-phd",
+    "gru-phd",
+    "mlp-phd",
+    "lnn-imm-phd",
+    "neural-phd",
     "smc-imm-phd",
+    "smc-lnn-phd-paper",
+    "smc-lnn-phd",
     "imm-member",
+    "lnn-member-paper",
+    "lnn-member",
     "smc-imm-member",
+    "smc-lnn-member-paper",
+    "smc-lnn-member",
     "imm-jpda-paper",
     "imm-jpda",
+    "neural-jpda",
     "imm-pmbm",
+    "wide-pmbm",
+    "gru-pmbm",
+    "lnn-pmbm",
+    "lnn-imm-pmbm",
+    "neural-pmbm",
 ];
 
 /// The method of that name.
 ///
 /// # Errors
 /// When there is no such method.
-pub fn method(name: &str) -> Result<Box<dyn Method>, StudyError> {
+pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError> {
+    use filters::{bank, cloud, published, straight};
+    use trackers::{jpda, jpda_paper, multi_bernoulli, phd, pmbm};
+    let liquid = |model| filters::liquid(models, model);
+    let liquid_bank = || filters::liquid_bank(models, "liquid");
+    let liquid_cloud = |model| filters::liquid_cloud(models, model);
+    let neural = || filters::neural(models);
     Ok(match name {
-        "gm-phd" => Box::new(Tracked::new(filters::straight, trackers::phd)),
-        "imm-phd-paper" => Box::new(Tracked::new(filters::published, trackers::phd)),
-        "imm-phd" => Box::new(Tracked::new(filters::bank, trackers::phd)),
-        "imm-member" => Box::new(Tracked::new(filters::bank, trackers::multi_bernoulli)),
-        "smc-imm-phd" => Box::new(Tracked::new(filters::cloud, trackers::phd)),
-        "smc-imm-member" => Box::new(Tracked::new(filters::cloud, trackers::multi_bernoulli)),
-        "imm-jpda-paper" => Box::new(Tracked::new(filters::published, trackers::jpda_paper)),
-        "imm-jpda" => Box::new(Tracked::new(filters::bank, trackers::jpda)),
-        "imm-pmbm" => Box::new(Tracked::new(filters::bank, trackers::pmbm)),
+        "gm-phd" => Box::new(Tracked::new(straight, phd)),
+        "imm-phd-paper" => Box::new(Tracked::new(published, phd)),
+        "lnn-phd-paper" => Box::new(Tracked::new(liquid("liquid-paper")?, phd)),
+        "imm-phd" => Box::new(Tracked::new(bank, phd)),
+        "lnn-phd" => Box::new(Tracked::new(liquid("liquid")?, phd)),
+        "gru-phd" => Box::new(Tracked::new(liquid("liquid-gru")?, phd)),
+        "mlp-phd" => Box::new(Tracked::new(liquid("liquid-mlp")?, phd)),
+        "lnn-imm-phd" => Box::new(Tracked::new(liquid_bank()?, phd)),
+        "neural-phd" => Box::new(Tracked::new(neural()?, phd)),
+        "smc-imm-phd" => Box::new(Tracked::new(cloud, phd)),
+        "smc-lnn-phd-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, phd)),
+        "smc-lnn-phd" => Box::new(Tracked::new(liquid_cloud("liquid")?, phd)),
+        "imm-member" => Box::new(Tracked::new(bank, multi_bernoulli)),
+        "lnn-member-paper" => Box::new(Tracked::new(liquid("liquid-paper")?, multi_bernoulli)),
+        "lnn-member" => Box::new(Tracked::new(liquid("liquid")?, multi_bernoulli)),
+        "smc-imm-member" => Box::new(Tracked::new(cloud, multi_bernoulli)),
+        "smc-lnn-member-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, multi_bernoulli)),
+        "smc-lnn-member" => Box::new(Tracked::new(liquid_cloud("liquid")?, multi_bernoulli)),
+        "imm-jpda-paper" => Box::new(Tracked::new(published, jpda_paper)),
+        "imm-jpda" => Box::new(Tracked::new(bank, jpda)),
+        "neural-jpda" => Box::new(Tracked::new(neural()?, jpda)),
+        "imm-pmbm" => Box::new(Tracked::new(bank, pmbm)),
+        "wide-pmbm" => Box::new(Tracked::new(filters::wide(models)?, pmbm)),
+        "gru-pmbm" => Box::new(Tracked::new(liquid("liquid-gru")?, pmbm)),
+        "lnn-pmbm" => Box::new(Tracked::new(liquid("liquid")?, pmbm)),
+        "lnn-imm-pmbm" => Box::new(Tracked::new(liquid_bank()?, pmbm)),
+        "neural-pmbm" => Box::new(Tracked::new(neural()?, pmbm)),
         _ => {
             let known = METHODS.join(", ");
             return Err(StudyError::UnknownMethod { study: "clutter", name: name.to_owned(), known });

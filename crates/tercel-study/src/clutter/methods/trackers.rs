@@ -25,7 +25,7 @@ fn three_hits() -> Management {
 /// Probability that an unexplained measurement is a new object. The publication has 0.3, which means twelve new objects a scan.
 const BIRTH: f64 = 0.05;
 
-pub(super) fn phd<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
+pub(crate) fn phd<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
     Phd::new(PhdConfig {
         gate: Gate::new(GATE)?,
         birth: BIRTH,
@@ -38,7 +38,7 @@ pub(super) fn phd<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
     })
 }
 
-pub(super) fn multi_bernoulli<B>(_: &Recording) -> Result<MultiBernoulli<B>, FilterError> {
+pub(crate) fn multi_bernoulli<B>(_: &Recording) -> Result<MultiBernoulli<B>, FilterError> {
     MultiBernoulli::new(MultiBernoulliConfig {
         gate: Gate::new(GATE)?,
         birth: BIRTH,
@@ -47,7 +47,7 @@ pub(super) fn multi_bernoulli<B>(_: &Recording) -> Result<MultiBernoulli<B>, Fil
     })
 }
 
-pub(super) fn jpda<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
+pub(crate) fn jpda<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
     Jpda::new(JpdaConfig {
         gate: Gate::new(GATE)?,
         birth: BIRTH,
@@ -61,7 +61,7 @@ pub(super) fn jpda<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
     })
 }
 
-pub(super) fn jpda_paper<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
+pub(crate) fn jpda_paper<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
     Jpda::new(JpdaConfig {
         gate: Gate::new(GATE)?,
         birth: BIRTH,
@@ -74,7 +74,7 @@ pub(super) fn jpda_paper<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
 const PRESENT: f64 = 6.0;
 const BIRTHS: f64 = 0.1;
 
-pub(super) fn pmbm<B>(recording: &Recording) -> Result<Pmbm<B>, FilterError> {
+pub(crate) fn pmbm<B>(recording: &Recording) -> Result<Pmbm<B>, FilterError> {
     let area = recording.scene.area();
     Pmbm::new(PmbmConfig {
         gate: Gate::new(GATE)?,

@@ -1,10 +1,10 @@
-//! Learned filters, with the models that come with Tercel.
+//! Learned filters, with the models that come with Tercel or others in their place.
 
 use std::sync::Arc;
 
 use tercel_core::error::FilterError;
 use tercel_neural::filter::{RmmNet, RmmNetwork};
-use tercel_neural::shipped;
+use tercel_neural::shipped::Models;
 
 use super::matrix::sensor;
 use super::{Method, Recording, StepEstimate};
@@ -15,9 +15,9 @@ use crate::extended::recording::follow;
 pub(super) struct Remembering(Arc<RmmNetwork>);
 
 impl Remembering {
-    /// With the shipped model of this name.
-    pub fn new(model: &str) -> Result<Self, StudyError> {
-        Ok(Remembering(Arc::new(RmmNetwork::from_model(&shipped::model(model)?)?)))
+    /// With the model of this name.
+    pub fn new(models: &Models, model: &str) -> Result<Self, StudyError> {
+        Ok(Remembering(Arc::new(RmmNetwork::from_model(&models.get(model)?)?)))
     }
 }
 

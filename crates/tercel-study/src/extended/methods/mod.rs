@@ -25,6 +25,8 @@ mod learned;
 mod matrix;
 mod shape;
 
+use tercel_neural::shipped::Models;
+
 use super::settings::Settings;
 use super::{Method, Recording, StepEstimate};
 use crate::error::StudyError;
@@ -64,6 +66,7 @@ pub(crate) fn method(
     study: &'static str,
     name: &str,
     settings: &Settings,
+    models: &Models,
 ) -> Result<Box<dyn Method>, StudyError> {
     let settings = *settings;
     Ok(match name {
@@ -81,8 +84,8 @@ pub(crate) fn method(
         "mem-ekf-paper" => Box::new(shape::Linearised { settings, paper: true }),
         "mem-rbpf" => Box::new(shape::Sampled { settings, paper: false }),
         "mem-rbpf-paper" => Box::new(shape::Sampled { settings, paper: true }),
-        "rmmnet-paper" => Box::new(learned::Remembering::new(settings.rmmnet_paper)?),
-        "rmmnet" => Box::new(learned::Remembering::new(settings.rmmnet)?),
+        "rmmnet-paper" => Box::new(learned::Remembering::new(models, settings.rmmnet_paper)?),
+        "rmmnet" => Box::new(learned::Remembering::new(models, settings.rmmnet)?),
         "known-size" => Box::new(known::Sized(settings)),
         "aligned" => Box::new(known::Straight(settings)),
         "aligned-ar" => Box::new(known::Regressive(settings)),

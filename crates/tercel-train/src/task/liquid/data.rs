@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Rotation2, Vector2, Vector4};
+use nalgebra::{Matrix2, Rotation2, Vector2, Vector4};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 use tercel_core::filter::{Extended, Filter};
 use tercel_core::motion::ConstantVelocity;
-use tercel_core::sensor::Position;
+use tercel_core::sensor::{Measurement, Position};
 
 use crate::TrainError;
 use crate::check::{at_least, positive, refused, size};
@@ -193,6 +193,22 @@ impl LiquidData {
             (seen || step == 0).then_some(place)
         };
         states.iter().enumerate().map(&mut plot).collect()
+    }
+}
+
+impl LiquidData {
+    /// A trajectory as this epoch has it, and what a sensor says of it at each step, with its accuracy.
+    pub(in crate::task) fn measured(
+        &self,
+        draw: Draw<'_>,
+        sample: u64,
+    ) -> (Vec<Vector4<f64>>, Vec<Option<Measurement<2>>>) {
+        let (states, mut random) = self.states(draw, sample);
+        let deviation = random.random_range(self.deviation[0]..=self.deviation[1]);
+        let noise = Matrix2::from_diagonal_element(deviation * deviation);
+        let plots = self.plots(&states, &mut random, deviation);
+        let measurement = |plot: Vector2<f64>| Measurement::from(plot).with_noise(noise);
+        (states, plots.into_iter().map(|plot| plot.map(measurement)).collect())
     }
 }
 

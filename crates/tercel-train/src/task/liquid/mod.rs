@@ -38,7 +38,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix4, Vector4};
 use serde::Deserialize;
 use tercel_core::belief::Gaussian;
-use tercel_neural::filter::{Absolute, Form, LiquidHyper, LiquidNetwork, Seen, Span};
+use tercel_neural::filter::{Absolute, Form, LiquidHyper, LiquidNetwork, Seen, Span, surprise, widths};
 use tercel_neural::{Card, Model, Scale};
 
 pub use data::{LiquidData, Watched};
@@ -189,11 +189,13 @@ impl LiquidTask {
 
     /// What is known of each member.
     fn seen(&self, state: &State) -> Vec<Seen> {
-        let members = state.both.corrected().into_iter().zip(&state.measured);
-        let of = |((correction, posterior), measured): ((_, Gaussian<4>), &f32)| Seen {
+        let members = state.both.pairs().into_iter().zip(&state.measured);
+        let of = |((prior, posterior), measured): ((Gaussian<4>, Gaussian<4>), &f32)| Seen {
             mean: posterior.mean,
-            correction,
+            correction: posterior.mean - prior.mean,
             measured: *measured != 0.0,
+            surprise: surprise(&prior, &posterior),
+            widths: widths(&posterior),
         };
         members.map(of).collect()
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix4, Vector2, Vector4};
 use tercel_core::belief::Gaussian;
 use tercel_neural::filter::{Form, Moved, Seen, Span};
 
@@ -25,7 +25,13 @@ pub struct Step {
 impl Step {
     fn moved(&self, state: &Gaussian<4>, outputs: &[f32]) -> Moved {
         // Of what is known only the mean counts for what outputs mean.
-        let seen = Seen { mean: state.mean, correction: Vector4::zeros(), measured: false };
+        let seen = Seen {
+            mean: state.mean,
+            correction: Vector4::zeros(),
+            measured: false,
+            surprise: Vector2::zeros(),
+            widths: [0.0; 2],
+        };
         self.form.moved(&seen, outputs, &[], self.span)
     }
 

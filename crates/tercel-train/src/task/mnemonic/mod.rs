@@ -162,11 +162,16 @@ impl MnemonicTask {
     fn see(&self, flown: &Flown, state: &State) -> Tensor {
         let width = self.hyper.inputs();
         let mut inputs = vec![0.0; flown.members * width];
-        let members = state.both.corrected().into_iter().zip(inputs.chunks_exact_mut(width));
-        for (member, ((correction, posterior), inputs)) in members.enumerate() {
+        let members = state.both.pairs().into_iter().zip(inputs.chunks_exact_mut(width));
+        for (member, ((prior, posterior), inputs)) in members.enumerate() {
             let origin = Vector2::new(flown.origins[2 * member], flown.origins[2 * member + 1]);
             let seen = state.seen[member] != 0.0;
-            self.hyper.see(&posterior, origin + posterior.mean.xy(), (&correction, seen), inputs);
+            self.hyper.see(
+                &posterior,
+                origin + posterior.mean.xy(),
+                (&(posterior.mean - prior.mean), seen),
+                inputs,
+            );
         }
         constant(inputs, [flown.members, width])
     }

@@ -7,13 +7,14 @@ use rand::RngExt;
 use serde::Deserialize;
 use tercel_core::error::FilterError;
 use tercel_core::filter::Filter;
-use tercel_core::sensor::{Measurement, RangeBearing};
-use tercel_neural::filter::{NeuralImm, NeuralImmBelief};
-use tercel_sim::air_traffic::{AirTraffic, Flight, Radar};
+use tercel_core::sensor::{Measurement, Position, RangeBearing, Sensor};
+use tercel_neural::filter::{BankNetwork, NeuralImm, NeuralImmBelief, NeuralImmHyper};
+use tercel_sim::air_traffic::{AirTraffic, Radar};
 use tercel_sim::{Interval, SimulationError};
 
 use crate::TrainError;
 use crate::check::{refused, size};
+use crate::task::liquid::LiquidData;
 use crate::trainer::{Draw, Split};
 
 /// The section `[data]`.
@@ -41,6 +42,10 @@ pub struct BankDataConfig {
     pub bearings: Vec<f64>,
     /// The range accuracy that goes with them, m.
     pub range: f64,
+    /// Objects that are measured as positions, in the place of flights that a radar sees. Their numbers and steps are those above.
+    pub positions: Option<LiquidData>,
+    /// Steps at the start that do not count: a filter may find its feet.
+    pub skip: usize,
 }
 
 impl Default for BankDataConfig {
@@ -56,6 +61,8 @@ impl Default for BankDataConfig {
             stated: 0.7,
             bearings: vec![0.15, 0.4, 0.7, 1.0],
             range: 50.0,
+            positions: None,
+            skip: 10,
         }
     }
 }
@@ -102,13 +109,26 @@ impl Population {
     }
 }
 
-/// Where flights come from, and the filters that follow them.
+/// Where objects come from, and the filters that follow them.
+#[derive(Debug)]
+enum Source {
+    Flights {
+        populations: Vec<AirTraffic>,
+        stated: NeuralImm<RangeBearing>,
+        estimating: NeuralImm<RangeBearing>,
+    },
+    Positions {
+        data: LiquidData,
+        filter: NeuralImm<Position<2>>,
+    },
+}
+
+/// Flights and other objects, as the bank follows them.
 #[derive(Debug)]
 pub(super) struct BankData {
     config: BankDataConfig,
-    populations: Vec<AirTraffic>,
-    stated: NeuralImm<RangeBearing>,
-    estimating: NeuralImm<RangeBearing>,
+    source: Source,
+    hyper: NeuralImmHyper,
     seed: u64,
     /// Flights that were followed and are kept, of both splits.
     kept: [Vec<OnceLock<Arc<Log>>>; 2],
@@ -119,15 +139,11 @@ const TRAINING: u64 = 0x6261_6e6b_0000_0000;
 const VALIDATION: u64 = 0x6261_6e6c_0000_0000;
 
 impl BankData {
-    /// The data of a recipe; `filter` makes the filter for some sensors, of which only the bank is used.
-    pub fn new(
-        config: &BankDataConfig,
-        seed: u64,
-        filter: impl Fn(&[RangeBearing]) -> Result<NeuralImm<RangeBearing>, FilterError>,
-    ) -> Result<Self, TrainError> {
+    /// The data of a recipe. Of the network only the bank is used.
+    pub fn new(config: &BankDataConfig, seed: u64, network: &Arc<BankNetwork>) -> Result<Self, TrainError> {
         size("data.training", config.training, [1, 100_000_000])?;
         size("data.validation", config.validation, [1, 100_000_000])?;
-        size("data.steps", config.steps, [super::SKIP + 2, 1_000_000])?;
+        size("data.steps", config.steps, [config.skip.saturating_add(2), 1_000_000])?;
         let [low, high] = config.detection;
         if !(0.0 < low && low <= high && high <= 1.0) {
             let value = format!("[{low}, {high}]");
@@ -138,6 +154,36 @@ impl BankData {
                 return Err(refused(key, share, "it is a share, between 0 and 1"));
             }
         }
+        Ok(Self {
+            source: match &config.positions {
+                Some(positions) => Source::positions(config, positions, network)?,
+                None => Source::flights(config, network)?,
+            },
+            hyper: network.hyper().clone(),
+            config: config.clone(),
+            seed,
+            kept: [empty(if config.fresh { 0 } else { config.training }), empty(config.validation)],
+        })
+    }
+}
+
+impl Source {
+    fn positions(
+        config: &BankDataConfig,
+        positions: &LiquidData,
+        network: &Arc<BankNetwork>,
+    ) -> Result<Self, TrainError> {
+        let BankDataConfig { training, validation, steps, detection, .. } = *config;
+        let data = LiquidData { training, validation, steps, detection, ..positions.clone() };
+        data.check()?;
+        let fault = |error: FilterError| TrainError::Recipe(format!("[data] or [model]: {error}"));
+        // Its accuracy is stated with each measurement.
+        let sensor = Position::new(data.deviation[0]).map_err(fault)?;
+        Ok(Source::Positions { data, filter: NeuralImm::new(network.clone(), &[sensor]).map_err(fault)? })
+    }
+
+    fn flights(config: &BankDataConfig, network: &Arc<BankNetwork>) -> Result<Self, TrainError> {
+        let filter = |radars: &[RangeBearing]| NeuralImm::new(network.clone(), radars);
         if config.population.is_empty() {
             return Err(refused("data.population", "[]", "there must be at least one"));
         }
@@ -151,16 +197,15 @@ impl BankData {
         let radars = radars.map_err(fault)?;
         let first =
             radars.first().ok_or_else(|| refused("data.bearings", "[]", "there must be at least one"))?;
-        Ok(Self {
+        Ok(Source::Flights {
             populations: config.population.iter().map(scenario).collect::<Result<_, _>>()?,
             stated: filter(std::slice::from_ref(first)).map_err(fault)?,
             estimating: filter(&radars).map_err(fault)?,
-            config: config.clone(),
-            seed,
-            kept: [empty(if config.fresh { 0 } else { config.training }), empty(config.validation)],
         })
     }
+}
 
+impl BankData {
     pub fn samples(&self, split: Split) -> usize {
         match split {
             Split::Training => self.config.training,
@@ -170,7 +215,7 @@ impl BankData {
 
     /// The flights of a draw, followed by the bank.
     pub fn batch(&self, draw: Draw<'_>) -> Result<Followed, TrainError> {
-        let hyper = self.stated.network().hyper();
+        let hyper = &self.hyper;
         let mut followed = Followed::new(draw.samples.len(), self.config.steps, hyper.inputs(), &hyper.rates);
         for (member, sample) in draw.samples.iter().enumerate() {
             let log = self.log(draw, *sample).map_err(|error| match error {
@@ -198,13 +243,35 @@ impl BankData {
     }
 
     fn follow(&self, draw: Draw<'_>, sample: u64) -> Result<Log, TrainError> {
+        match &self.source {
+            Source::Flights { populations, stated, estimating } => {
+                self.follow_flight(draw, sample, populations, [stated, estimating])
+            }
+            Source::Positions { data, filter } => {
+                let (states, measurements) = data.measured(draw, sample);
+                let before = states.first().into_iter().chain(&states);
+                let told = states.iter().zip(before);
+                let manoeuvres: Vec<u8> = told.map(|(after, before)| turned(before, after)).collect();
+                let flown = Flown { states: &states, manoeuvres: &manoeuvres, interval: data.interval };
+                Log::of(filter, &flown, &measurements, self.config.skip)
+            }
+        }
+    }
+
+    fn follow_flight(
+        &self,
+        draw: Draw<'_>,
+        sample: u64,
+        populations: &[AirTraffic],
+        [stating, estimating]: [&NeuralImm<RangeBearing>; 2],
+    ) -> Result<Log, TrainError> {
         let fault = |error: &dyn std::fmt::Display| TrainError::Data(error.to_string());
         let (seed, run) = match draw.split {
             Split::Training => (TRAINING, draw.epoch as u64 * self.config.training as u64 + sample),
             Split::Validation => (VALIDATION, sample),
         };
         let seed = seed ^ self.seed;
-        let flight = self.populations[(sample % self.populations.len() as u64) as usize].flight(seed, run);
+        let flight = populations[(sample % populations.len() as u64) as usize].flight(seed, run);
         let mut random = draw.random(sample);
         let [low, high] = self.config.detection;
         let drawn = low + (high - low) * random.random::<f64>();
@@ -212,25 +279,35 @@ impl BankData {
         let stated = random.random::<f64>() < self.config.stated;
         let radar = flight.radar().with_detection(detection).map_err(|error| fault(&error))?;
         let plots = flight.observe(&radar, seed, run);
-        let filter = if stated { &self.stated } else { &self.estimating };
-        let measure = |plot: &Vector2<f64>| measurement(plot, stated.then_some(&radar));
-        let (first, rest) = plots.split_first().ok_or_else(|| fault(&"it has no steps"))?;
-        let first = first.as_ref().ok_or_else(|| fault(&"its first step was not seen"))?;
-        let mut belief = filter.birth(&measure(first)).map_err(|error| fault(&error))?;
-        let mut log = Log::default();
-        for (step, plot) in rest.iter().enumerate() {
-            filter.predict(&mut belief, flight.interval());
-            if let Some(plot) = plot {
-                filter.update(&mut belief, &measure(plot)).map_err(|error| fault(&error))?;
-                log.inputs.extend_from_slice(belief.inputs());
-                log.updates += 1;
-            }
-            if step + 1 >= super::SKIP && log.updates > 0 {
-                log.expect(&belief, &flight, step + 1);
-            }
-        }
-        Ok(log)
+        let filter = if stated { stating } else { estimating };
+        let measure = |plot: &Option<Vector2<f64>>| {
+            plot.as_ref().map(|plot| measurement(plot, stated.then_some(&radar)))
+        };
+        let measurements: Vec<_> = plots.iter().map(measure).collect();
+        let manoeuvres: Vec<u8> = flight.manoeuvres().iter().map(|flown| flown.index() as u8).collect();
+        let flown = Flown { states: flight.states(), manoeuvres: &manoeuvres, interval: flight.interval() };
+        Log::of(filter, &flown, &measurements, self.config.skip)
     }
+}
+
+/// What an object did.
+struct Flown<'a> {
+    states: &'a [Vector4<f64>],
+    /// At each step: 0 straight, 1 left, 2 right.
+    manoeuvres: &'a [u8],
+    /// Time between steps, s.
+    interval: f64,
+}
+
+/// Smallest change of the heading in a step that is a turn, rad.
+const TURN: f64 = 0.01;
+
+/// Whether an object turned between two states, and to which side.
+fn turned(before: &Vector4<f64>, after: &Vector4<f64>) -> u8 {
+    let across = before[2] * after[3] - before[3] * after[2];
+    let along = before[2] * after[2] + before[3] * after[3];
+    let angle = across.atan2(along);
+    if angle.abs() < TURN { 0 } else { 1 + u8::from(angle < 0.0) }
 }
 
 fn empty(count: usize) -> Vec<OnceLock<Arc<Log>>> {
@@ -262,17 +339,43 @@ struct Log {
 }
 
 impl Log {
-    fn expect(&mut self, belief: &NeuralImmBelief, flight: &Flight, step: usize) {
+    /// What the bank of a filter says of an object at every step from number `skip` on.
+    fn of<S: Sensor<4, 2> + Clone>(
+        filter: &NeuralImm<S>,
+        flown: &Flown<'_>,
+        measurements: &[Option<Measurement<2>>],
+        skip: usize,
+    ) -> Result<Self, TrainError> {
+        let fault = |error: &dyn std::fmt::Display| TrainError::Data(error.to_string());
+        let (first, rest) = measurements.split_first().ok_or_else(|| fault(&"it has no steps"))?;
+        let first = first.as_ref().ok_or_else(|| fault(&"its first step was not seen"))?;
+        let mut belief = filter.birth(first).map_err(|error| fault(&error))?;
+        let mut log = Log::default();
+        for (step, measurement) in (1..).zip(rest) {
+            filter.predict(&mut belief, flown.interval);
+            if let Some(measurement) = measurement {
+                filter.update(&mut belief, measurement).map_err(|error| fault(&error))?;
+                log.inputs.extend_from_slice(belief.inputs());
+                log.updates += 1;
+            }
+            if step >= skip && log.updates > 0 {
+                log.expect(&belief, flown, step);
+            }
+        }
+        Ok(log)
+    }
+
+    fn expect(&mut self, belief: &NeuralImmBelief, flown: &Flown<'_>, step: usize) {
         let outlook = belief.outlook();
         let four = |v: &Vector4<f64>| -> [f32; 4] { std::array::from_fn(|i| v[i] as f32) };
-        let target = outlook.turned(&(flight.states()[step] - outlook.state().mean));
+        let target = outlook.turned(&(flown.states[step] - outlook.state().mean));
         let root = outlook.root();
         self.instants.push(Instant {
             member: 0,
             row: self.updates - 1,
             target: four(&target),
             root: std::array::from_fn(|i| std::array::from_fn(|j| root[(i, j)] as f32)),
-            manoeuvre: flight.manoeuvres()[step].index() as u8,
+            manoeuvre: flown.manoeuvres[step],
         });
         self.ln_probabilities.extend(outlook.probabilities().iter().map(|p| p.ln() as f32));
         self.offsets.extend(outlook.offsets().iter().map(four));

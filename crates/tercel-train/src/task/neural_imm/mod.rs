@@ -12,12 +12,13 @@
 //!     + l · mean of (‖(D L)⁻¹ error‖² / 2 + ln |D|)
 //! ```
 //!
-//! over all steps but the first ten, those without a measurement included. The last term teaches the scales `D` of the covariance
+//! over all steps but the first (`skip`, ten unless the recipe says otherwise), those without a measurement included. The last term teaches the scales `D` of the covariance
 //! alone; the error counts as given in it.
 //!
 //! ## Use it when
 //!
-//! a bank of models is good, and should be better. Flights are simulated ([`tercel_sim::air_traffic`]), and new in every epoch.
+//! a bank of models is good, and should be better. Flights are simulated ([`tercel_sim::air_traffic`]), or other objects that are
+//! measured as positions ([`LiquidData`](crate::task::liquid::LiquidData)).
 //!
 //! ## Reference
 //!
@@ -33,7 +34,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use serde::Deserialize;
-use tercel_neural::filter::{BankNetwork, NeuralImm, NeuralImmHyper};
+use tercel_neural::filter::{BankNetwork, NeuralImmHyper};
 use tercel_neural::{Card, Model, Tensor as Stored};
 
 use data::{BankData, Followed};
@@ -46,9 +47,6 @@ use crate::layer::{Activation, Gru, Linear, numbered};
 use crate::recipe::{Kind, Recipe};
 use crate::trainer::{self, Draw, Loss, Progress, Run, Split, Summary, Task};
 use crate::{Initial, ParameterSet, TrainError, Weights};
-
-/// Steps at the start of a flight that do not count: a filter may find its feet.
-const SKIP: usize = 10;
 
 /// The kind `neural-imm` of recipes.
 #[derive(Debug, Clone, Copy)]
@@ -109,8 +107,7 @@ impl NeuralImmTask {
         at_least("loss.entropy", loss.entropy, 0.0)?;
         at_least("loss.likelihood", loss.likelihood, 0.0)?;
         let network = Arc::new(smallest(&hyper)?);
-        let data =
-            BankData::new(&recipe.data, recipe.seed, |radars| NeuralImm::new(network.clone(), radars))?;
+        let data = BankData::new(&recipe.data, recipe.seed, &network)?;
         let mut set = ParameterSet::new(recipe.seed);
         let input = Linear::new(&mut set, "input", hyper.inputs(), hyper.input, Activation::Relu)?;
         let recurrent = (0..hyper.layers)
