@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use tercel_core::extended::{Points, Scattering};
 use tercel_neural::filter::rmm_net::{
-    Aligned, Before, EXTENT_SEEN, Length, Past, Regression, Track, View, heading,
+    Aligned, Before, EXTENT_SEEN, Kinematics, Length, Past, Regression, Track, View, heading,
 };
 
 use super::State;
 use super::data::Rides;
 use super::head::Head;
 use super::operations::{Given, Pool, Step};
-use super::rows::{STEP, TRACK, numbers, plain, wide};
+use super::rows::{STEP, TRACK, numbers, plain, shifted, wide};
 use crate::backend::{Tensor, apply, constant, values};
 use crate::layer::{Activation, Linear, Lstm, LstmState};
 use crate::{ParameterSet, TrainError, Weights};
@@ -65,9 +65,9 @@ impl AlignedNet {
 
     pub fn first(&self, rides: &Rides) -> State {
         let options = &self.options;
-        let row = |(motion, _): &(_, f64)| {
+        let row = |(motion, _): &(Kinematics<f64>, f64)| {
             let track = Track { motion: *motion, axes: options.axes.map(f64::ln), worth: options.worth };
-            numbers(&track).map(|x| x as f32)
+            shifted(numbers(&track), motion.place).map(|x| x as f32)
         };
         let known = |(_, angle): &(_, f64)| Known {
             angle: *angle,
@@ -78,6 +78,7 @@ impl AlignedNet {
         State {
             tracks: constant(rides.births.iter().flat_map(row).collect(), [rides.members, TRACK]),
             memory: LstmState::zero(rides.members, self.memory.size()),
+            origins: rides.births.iter().map(|(motion, _)| motion.place).collect(),
             known: rides.births.iter().map(known).collect(),
         }
     }
@@ -85,18 +86,21 @@ impl AlignedNet {
     /// One step of the batch: the state after it, and its row for the costs.
     pub fn step(&self, weights: &Weights, rides: &Rides, state: State, step: usize) -> (State, Tensor) {
         let (members, scans) = (rides.members, &rides.scans[step]);
-        let State { tracks, memory, mut known } = state;
+        let State { tracks, memory, mut origins, mut known } = state;
         let before: Vec<Track<f64>> = values(&tracks).chunks_exact(TRACK).map(plain).collect();
         let seen = self.see_motion(&before, &mut known);
         let memory = self.memory.step(weights, seen.clone(), memory);
         let (_, motion) = self.motion.say(weights, vec![memory.hidden.clone(), seen]);
         let Predicted { priors, given, points, moments } =
-            self.predict(&before, &known, &wide(&motion), scans);
+            self.predict(&before, (&known, &origins), &wide(&motion), scans);
         let pooled = self.encode(weights, points, scans.iter().map(Points::count).collect());
         let (hidden, scan) = self.scan.say(weights, vec![pooled, moments, memory.hidden.clone()]);
         let extents = self.see_extents(&priors, &given, &wide(&scan));
         let (_, extent) = self.extent.say(weights, vec![hidden, constant(extents, [members, EXTENT_SEEN])]);
         let (options, given) = (Arc::clone(&self.options), Arc::new(given));
+        for (origin, given) in origins.iter_mut().zip(given.iter()) {
+            (0..2).for_each(|i| origin[i] += given.shift[i]);
+        }
         let operation = Step { options, length: self.length, given };
         let row = apply(operation, [tracks, motion, scan, extent]);
         for ((known, prior), (row, scan)) in
@@ -104,7 +108,7 @@ impl AlignedNet {
         {
             known.go_on(prior, row, !scan.is_empty());
         }
-        (State { tracks: row.clone().narrow(1, 0, TRACK), memory, known }, row)
+        (State { tracks: row.clone().narrow(1, 0, TRACK), memory, origins, known }, row)
     }
 
     /// What the memory sees of all members, which have learned from the velocity after the last step.
@@ -123,7 +127,7 @@ impl AlignedNet {
     fn predict(
         &self,
         before: &[Track<f64>],
-        known: &[Known],
+        (known, origins): (&[Known], &[[f64; 2]]),
         said: &[Vec<f64>],
         scans: &[Points],
     ) -> Predicted {
@@ -140,15 +144,19 @@ impl AlignedNet {
             let (velocities, expected) = (known.regression.past().to_vec(), known.regression.expected());
             let past = Past { heading: axis, velocities: &velocities, expected };
             let prior = before.predict(options, &past, &said[member], self.length);
-            let view = (!points.is_empty()).then(|| View::new(options, &prior, known.angle, points, noise));
+            let view = (!points.is_empty()).then(|| {
+                let view = View::new(options, &prior, known.angle, points, noise);
+                View { mean: [0, 1].map(|i| view.mean[i] - origins[member][i]), ..view }
+            });
             if let Some(view) = &view {
                 let (own, others) = rest.split_at_mut(points.count() * sizes.point);
                 view.see_points(&prior, points, own);
                 options.see_scan(&prior, view, row);
                 rest = others;
             }
+            let shift = prior.motion.place;
             priors.push(prior);
-            given.push(Given { heading: axis, velocities, expected, held: known.angle, view });
+            given.push(Given { heading: axis, velocities, expected, held: known.angle, view, shift });
         }
         let points = constant(rows, [total.max(1), sizes.point]);
         Predicted { priors, given, points, moments: constant(moments, [scans.len(), sizes.scan_seen]) }
@@ -187,7 +195,8 @@ struct Predicted {
 impl Known {
     /// After a step from this prediction to this row.
     fn go_on(&mut self, prior: &Track<f64>, row: &[f32], measured: bool) {
-        let prior = prior.motion.numbers();
+        // The position of the row is relative to the predicted one.
+        let prior = shifted(prior.motion.numbers(), prior.motion.place);
         self.angle = f64::from(row[TRACK]);
         self.correction = std::array::from_fn(|i| if measured { f64::from(row[i]) - prior[i] } else { 0.0 });
         self.measured = measured;

@@ -67,6 +67,14 @@ pub struct Truth {
     pub extent: Symmetric<f64>,
 }
 
+impl Truth {
+    /// The same with the position relative to an origin.
+    pub fn from(&self, origin: [f64; 2]) -> Self {
+        let [x, y, vx, vy] = self.state;
+        Truth { state: [x - origin[0], y - origin[1], vx, vy], ..*self }
+    }
+}
+
 impl Costs {
     /// Refuses weights and scales that make no sense.
     pub fn check(&self) -> Result<(), TrainError> {

@@ -72,7 +72,11 @@ pub struct RmmNetTask {
 /// A batch of filters between two steps.
 #[derive(Debug, Clone)]
 pub struct State {
+    /// A row for each member, with positions relative to its origin: single precision would not hold those of an object that has
+    /// gone far.
     tracks: Tensor,
+    /// Where the origins are, m. Each is where the object was expected last.
+    origins: Vec<[f64; 2]>,
     memory: LstmState,
     known: Vec<Known>,
 }
@@ -212,17 +216,16 @@ impl Task for RmmNetTask {
         let last = (first + self.costs.window).min(rides.scans.len());
         let mut state = memory.take().unwrap_or_else(|| self.first(rides));
         let mut rows = Vec::with_capacity(last - first);
+        let mut truth = Vec::with_capacity((last - first) * rides.members);
         for step in first..last {
             let (next, row) = self.step(weights, rides, state, step);
             state = next;
             rows.push(row);
+            truth.extend(
+                rides.truth[step].iter().zip(&state.origins).map(|(truth, origin)| truth.from(*origin)),
+            );
         }
-        *memory = Some(State {
-            tracks: detached(state.tracks),
-            memory: state.memory.detached(),
-            known: state.known,
-        });
-        let truth: Vec<Truth> = rides.truth[first..last].concat();
+        *memory = Some(State { tracks: detached(state.tracks), memory: state.memory.detached(), ..state });
         let rows = Tensor::cat(rows, 0);
         let parts = parts(self.layout(), &values(&rows), &truth);
         let terms = truth.len() as f64;

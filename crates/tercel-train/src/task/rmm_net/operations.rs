@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tercel_neural::filter::rmm_net::{Aligned, Length, Moments, Number, Past, Published, View};
 
 use super::cost::{Costs, Truth};
-use super::rows::{EXTENDED, Layout, STEP, extended, extended_numbers, step, track};
+use super::rows::{EXTENDED, Layout, STEP, extended, extended_numbers, shifted, step, track};
 use crate::backend::{Forward, Matrix, Operation, Past as Before};
 use crate::tape::{Tape, Variable};
 
@@ -17,6 +17,8 @@ pub struct Given {
     pub expected: [f64; 2],
     /// The direction of the extent before.
     pub held: f64,
+    /// By how much the origin moves.
+    pub shift: [f64; 2],
     /// The scan, if it has points.
     pub view: Option<View>,
 }
@@ -36,14 +38,15 @@ impl Rows<4, STEP> for Step {
         let past = Past { heading: given.heading, velocities: &given.velocities, expected: given.expected };
         let prior = track(before).predict(&self.options, &past, motion, self.length);
         let expected = prior.foresee(&self.options, given.held, motion);
-        match &given.view {
+        let row = match &given.view {
             None => step(&prior, &expected, &expected, &prior),
             Some(view) => {
                 let mut after = prior.update(&self.options, view, scan);
                 let found = after.settle_extent(&self.options, view, extent);
                 step(&after, &found, &expected, &prior)
             }
-        }
+        };
+        shifted(row, given.shift)
     }
 }
 
@@ -112,15 +115,16 @@ impl Operation<4> for Step {
 pub struct PublishedStep {
     pub options: Arc<Published>,
     pub dt: f64,
-    /// The scans, where they have points.
-    pub seen: Arc<Vec<Option<Moments>>>,
+    /// The scans, where they have points, and by how much the origins move.
+    pub seen: Arc<Vec<(Option<Moments>, [f64; 2])>>,
 }
 
 impl Rows<3, EXTENDED> for PublishedStep {
     fn of<T: Number>(&self, member: usize, [before, prediction, scan]: [&[T]; 3]) -> [T; EXTENDED] {
         let prior = extended(before).predict(&self.options, prediction, self.dt);
-        let after = self.seen[member].as_ref().map(|seen| prior.update(&self.options, seen, scan));
-        extended_numbers(&after.unwrap_or(prior))
+        let (seen, shift) = &self.seen[member];
+        let after = seen.as_ref().map(|seen| prior.update(&self.options, seen, scan));
+        shifted(extended_numbers(&after.unwrap_or(prior)), *shift)
     }
 }
 

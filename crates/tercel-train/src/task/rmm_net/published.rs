@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use tercel_core::extended::{Points, Scattering};
-use tercel_neural::filter::rmm_net::{Extended, Moments, Published, widths};
+use tercel_neural::filter::rmm_net::{Extended, Kinematics, Moments, Published, widths};
 
 use super::State;
 use super::data::Rides;
 use super::head::Head;
 use super::operations::PublishedStep;
-use super::rows::{EXTENDED, extended, extended_numbers, wide};
+use super::rows::{EXTENDED, extended, extended_numbers, shifted, wide};
 use crate::backend::{Tensor, apply, constant};
 use crate::layer::{Lstm, LstmState};
 use crate::{ParameterSet, TrainError, Weights};
@@ -67,12 +67,14 @@ impl PublishedNet {
 
     pub fn first(&self, rides: &Rides) -> State {
         let (extent, weight) = self.options.first_extent();
-        let row = |(motion, _): &(_, f64)| {
-            extended_numbers(&Extended { motion: *motion, extent, weight }).map(|x| x as f32)
+        let row = |(motion, _): &(Kinematics<f64>, f64)| {
+            let first = extended_numbers(&Extended { motion: *motion, extent, weight });
+            shifted(first, motion.place).map(|x| x as f32)
         };
         State {
             tracks: constant(rides.births.iter().flat_map(row).collect(), [rides.members, EXTENDED]),
             memory: LstmState::zero(rides.members, self.memory.as_ref().map_or(1, Lstm::size)),
+            origins: rides.births.iter().map(|(motion, _)| motion.place).collect(),
             known: Vec::new(),
         }
     }
@@ -80,7 +82,7 @@ impl PublishedNet {
     /// One step of the batch: the state after it, and its row for the costs.
     pub fn step(&self, weights: &Weights, rides: &Rides, state: State, step: usize) -> (State, Tensor) {
         let (options, members) = (&self.options, rides.members);
-        let State { tracks, mut memory, known } = state;
+        let State { tracks, mut memory, mut origins, known } = state;
         let before: Vec<Extended<f64>> = wide(&tracks).iter().map(|row| extended(row)).collect();
         let mut seen = vec![0.0; members * widths::ESTIMATE_SEEN];
         for (estimate, row) in before.iter().zip(seen.chunks_exact_mut(widths::ESTIMATE_SEEN)) {
@@ -101,34 +103,40 @@ impl PublishedNet {
             }
             None => constant(vec![0.0; members * widths::PREDICTED], [members, widths::PREDICTED]),
         };
-        let (moments, scans) = self.see_scans(&before, &wide(&prediction), &rides.scans[step]);
+        let (moments, scans) = self.see_scans((&before, &origins), &wide(&prediction), &rides.scans[step]);
         let scan = match &self.update {
             Some(head) => head.say(weights, vec![constant(scans, [members, widths::SCAN_SEEN]), context]).1,
             None => constant(vec![0.0; members * widths::SAID[3]], [members, widths::SAID[3]]),
         };
         let operation = PublishedStep { options: Arc::clone(options), dt: self.dt, seen: Arc::new(moments) };
+        for (origin, (_, shift)) in origins.iter_mut().zip(operation.seen.iter()) {
+            (0..2).for_each(|i| origin[i] += shift[i]);
+        }
         let row = apply(operation, [tracks, prediction, scan]);
-        (State { tracks: row.clone(), memory, known }, row)
+        (State { tracks: row.clone(), memory, origins, known }, row)
     }
 
-    /// The moments of scans with points, and what is seen of them.
+    /// The moments of scans with points, how far the predictions are from the origins, and what is seen of the scans.
     fn see_scans(
         &self,
-        before: &[Extended<f64>],
+        (before, origins): (&[Extended<f64>], &[[f64; 2]]),
         said: &[Vec<f64>],
         scans: &[Points],
-    ) -> (Vec<Option<Moments>>, Vec<f32>) {
+    ) -> (Vec<(Option<Moments>, [f64; 2])>, Vec<f32>) {
         let (scale, noise) = (self.scattering.scale(), self.scattering.noise());
         let mut rows = vec![0.0; scans.len() * widths::SCAN_SEEN];
         let mut moments = Vec::with_capacity(scans.len());
         for (member, row) in rows.chunks_exact_mut(widths::SCAN_SEEN).enumerate() {
             let points = &scans[member];
-            let own = (!points.is_empty()).then(|| Moments::new(points, scale, &noise));
+            let prior = before[member].predict(&self.options, &said[member], self.dt);
+            let own = (!points.is_empty()).then(|| {
+                let own = Moments::new(points, scale, &noise);
+                Moments { mean: [0, 1].map(|i| own.mean[i] - origins[member][i]), ..own }
+            });
             if let Some(own) = &own {
-                let prior = before[member].predict(&self.options, &said[member], self.dt);
                 self.options.see_scan(&prior, own, row);
             }
-            moments.push(own);
+            moments.push((own, prior.motion.place));
         }
         (moments, rows)
     }

@@ -39,6 +39,12 @@ pub fn wide(tensor: &Tensor) -> Vec<Vec<f64>> {
     values(tensor).chunks_exact(width).map(row).collect()
 }
 
+/// The same numbers with positions relative to another origin.
+pub fn shifted<T: Number, const N: usize>(mut row: [T; N], shift: [f64; 2]) -> [T; N] {
+    (row[0], row[1]) = (row[0] + -shift[0], row[1] + -shift[1]);
+    row
+}
+
 /// What a step gives, in the order of a row.
 pub fn step<T: Number>(
     after: &Track<T>,
