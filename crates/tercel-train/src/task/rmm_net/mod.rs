@@ -3,7 +3,7 @@
 //! ## Definition
 //!
 //! The filter of [`tercel_neural::filter::RmmNet`], differentiable, with the costs of [`Costs`]. Its step is written once, over
-//! numbers that are plain at run time and record themselves here ([`crate::tape`]). Gradients flow through the recursion of the
+//! numbers that are plain at run time and record themselves here (`crate::tape`). Gradients flow through the recursion of the
 //! filter and the memory of the network, within windows of truncated back-propagation; what the network sees counts as given. The
 //! untrained network says nothing, so training starts from a random-matrix filter in straight motion.
 //!
