@@ -21,7 +21,7 @@ use crate::{SimulationError, Stream};
 pub use crossing::{Crossing, CrossingScene};
 pub use heading::Heading;
 pub use scatterers::Scatterers;
-pub use vehicle::{Generator, Sizes, Vehicle};
+pub use vehicle::{Generator, Sizes, Vehicle, is_stable};
 
 /// The truth of one extended object at equal steps of time.
 #[derive(Debug, Clone, PartialEq)]

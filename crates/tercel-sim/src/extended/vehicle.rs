@@ -118,9 +118,9 @@ impl Generator {
     }
 }
 
-/// Whether all roots lie inside the unit circle: the reflection coefficients of the step-down recursion are
-/// below one.
-fn is_stable(weights: &[f64]) -> bool {
+/// Whether a motion whose velocity depends on the velocities before with these weights, the newest first, is stable: all roots of
+/// its polynomial lie inside the unit circle, because the reflection coefficients of the step-down recursion are below one.
+pub fn is_stable(weights: &[f64]) -> bool {
     let mut polynomial: Vec<f64> = weights.iter().map(|weight| -weight).collect();
     while let Some(reflection) = polynomial.pop() {
         if reflection.abs() >= 1.0 {

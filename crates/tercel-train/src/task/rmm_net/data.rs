@@ -9,6 +9,7 @@ use tercel_neural::filter::rmm_net::{Kinematics, Symmetric, begin};
 use tercel_sim::extended::{Crossing, Generator, Heading, Ride, Scatterers, Sizes, Vehicle};
 
 use super::cost::Truth;
+use super::imitation::imitation;
 use crate::TrainError;
 use crate::check::{positive, refused, size, within};
 use crate::trainer::{Draw, Split, Tracks};
@@ -64,6 +65,9 @@ pub enum Source {
         folds: usize,
         /// The part that is held out to judge by, from 0.
         fold: usize,
+        /// Learns from simulated tracks instead, each of which moves as a recorded one with so many past velocities.
+        #[serde(default)]
+        imitated: Option<usize>,
     },
 }
 
@@ -127,7 +131,8 @@ impl RmmNetData {
                 }
                 Ok(())
             }
-            Source::Tracks { axes, folds, fold } => {
+            Source::Tracks { axes, folds, fold, imitated } => {
+                size("data.source.imitated", imitated.unwrap_or(1), [1, 64])?;
                 positive("data.source.axes[0]", axes[0])?;
                 positive("data.source.axes[1]", axes[1])?;
                 size("data.source.folds", *folds, [2, 1 << 20])?;
@@ -190,7 +195,7 @@ impl RmmNetData {
                 let sizes = if own { Sizes::MIXED } else { Sizes::PUBLISHED };
                 Ok(vehicle.with_sizes(sizes).map_err(failed)?.ride(seed, number))
             }
-            Source::Tracks { axes, folds, fold } => {
+            Source::Tracks { axes, folds, fold, imitated } => {
                 let here = |(number, _): &(usize, &Vec<Vector4<f64>>)| {
                     (number % folds == *fold) == (draw.split == Split::Validation)
                 };
@@ -198,7 +203,12 @@ impl RmmNetData {
                 let Some(track) = own.get(sample as usize % own.len().max(1)) else {
                     return Err(TrainError::Data("there are fewer tracks than folds".to_owned()));
                 };
-                let states = self.cut(track, draw.split, random);
+                let states = match imitated {
+                    Some(order) => {
+                        self.cut(&imitation(track, *order, self.interval, random)?, draw.split, random)
+                    }
+                    None => self.cut(track, draw.split, random),
+                };
                 let angles = Heading::Course.angles(&states, draw.seed, sample);
                 Ride::new(self.interval, states, angles, Vector2::from(*axes)).map_err(failed)
             }

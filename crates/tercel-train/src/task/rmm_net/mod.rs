@@ -19,6 +19,7 @@ mod aligned;
 mod cost;
 mod data;
 mod head;
+mod imitation;
 mod operations;
 mod published;
 mod rows;

@@ -314,6 +314,40 @@ fn a_recipe_that_needs_tracks_says_how_they_are_named() {
 }
 
 #[test]
+fn an_imitation_begins_as_the_track_and_depends_on_its_past_as_that_does() {
+    // A velocity that alternates around a mean.
+    let mut random = Draw { split: Split::Training, epoch: 0, seed: 1, samples: &[] }.random(0);
+    let mut place = nalgebra::Vector2::new(5.0, -3.0);
+    let mut around = nalgebra::Vector2::new(20.0, 0.0);
+    let mut track = Vec::new();
+    for step in 0..4000_u32 {
+        let velocity = nalgebra::Vector2::new(50.0, 10.0) + around;
+        if step > 0 {
+            place += velocity * 4.0;
+        }
+        track.push(Vector4::new(place.x, place.y, velocity.x, velocity.y));
+        let mut push = || rand::RngExt::random_range(&mut random, -4.0..4.0);
+        around = around * -0.9 + nalgebra::Vector2::new(push(), push());
+    }
+    let found = imitation::imitation(&track, 1, 4.0, &mut random).unwrap();
+    assert_eq!((found.len(), found[0]), (track.len(), track[0]));
+    let off = |step: usize| nalgebra::Vector2::new(found[step][2] - 50.0, found[step][3] - 10.0);
+    let (mut product, mut square) = (0.0, 0.0);
+    for step in 1..found.len() {
+        let moved = (found[step].xy() - found[step - 1].xy()) / 4.0;
+        assert!((moved - nalgebra::Vector2::new(found[step][2], found[step][3])).norm() < 1e-6);
+        product += off(step).dot(&off(step - 1));
+        square += off(step - 1).norm_squared();
+    }
+    assert!((product / square + 0.9).abs() < 0.05, "{}", product / square);
+    // One that grows is tamed, and one that is too short is refused.
+    let growing: Vec<_> = (0..200).map(|k| Vector4::new(0.0, 0.0, 1.1_f64.powi(k), 0.0)).collect();
+    let tamed = imitation::imitation(&growing, 3, 4.0, &mut random).unwrap();
+    assert!(tamed.iter().all(|state| state.iter().all(|x| x.is_finite())));
+    assert!(imitation::imitation(&track[..20], 10, 4.0, &mut random).is_err());
+}
+
+#[test]
 fn points_are_pooled_by_mean_and_maximum_whatever_their_order_and_however_many() {
     let rows = [3.0, -1.0, 1.0, 2.0, -2.0, 0.5];
     let pool = Pool { counts: Arc::new(vec![2, 0, 1]) };
