@@ -130,7 +130,7 @@ fn boxed<E: Experiment + 'static>(
 }
 
 /// All studies.
-pub const STUDIES: [Study; 13] = [
+pub const STUDIES: [Study; 14] = [
     Study {
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
@@ -191,9 +191,17 @@ pub const STUDIES: [Study; 13] = [
         }),
     },
     Study {
+        name: "vehicle-ablation",
+        about: "what the blocks of RMMNet are worth, on the vehicles of the study vehicle (Table III)",
+        methods: &extended::methods::ABLATION,
+        kind: Kind::MonteCarlo(MonteCarlo::new(extended::SEED, 40, |r| {
+            boxed(ExtendedExperiment::ablation(r))
+        })),
+    },
+    Study {
         name: "aircraft",
         about: "airliners on recorded tracks, seen as many points (RMMNet paper, Table II)",
-        methods: extended::methods::AIRCRAFT_METHODS,
+        methods: &extended::methods::AIRCRAFT_METHODS,
         kind: Kind::MonteCarlo(MonteCarlo {
             sets: &["course", "smoothed", "crab", "even"],
             data: true,
@@ -469,6 +477,7 @@ mod tests {
             "atc-missing",
             "atc-ablation",
             "vehicle",
+            "vehicle-ablation",
             "extended-scene",
             "clutter-all",
             "clutter-random",

@@ -101,6 +101,7 @@ Studies:
   atc-missing      errors over the detection probability of the radar (--set test or hshm)
   atc-ablation     what the parts of the published ensemble are worth
   vehicle          one vehicle seen as many points: motion and ellipse (--set backward or forward)
+  vehicle-ablation what the blocks of RMMNet are worth
   aircraft         airliners on recorded tracks (--set course, smoothed, crab or even)
   extended-scene   three extended objects that cross among false points
   clutter-partial  nine objects in dense clutter, two of which manoeuvre

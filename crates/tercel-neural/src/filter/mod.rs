@@ -40,7 +40,7 @@ pub use liquid::{
 };
 pub use memory::Memory;
 pub use mnemonic::{MnemonicBelief, MnemonicHyper, MnemonicKalman, MnemonicNetwork};
-pub use neural_imm::{BankNetwork, NeuralImm, NeuralImmBelief, NeuralImmHyper, Outlook};
+pub use neural_imm::{BankNetwork, NeuralImm, NeuralImmBelief, NeuralImmHyper, Outlook, Recurrence};
 pub use rmm_net::{RmmNet, RmmNetBelief, RmmNetHyper, RmmNetwork};
 pub use sight::Sight;
 pub use tr_mtt::{Frame, TrMtt, TrMttBelief, TrMttHyper, TransformerNetwork};

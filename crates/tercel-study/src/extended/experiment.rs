@@ -91,6 +91,14 @@ impl ExtendedExperiment {
         )
     }
 
+    /// The study `vehicle-ablation`: what the blocks of RMMNet are worth.
+    pub(crate) fn ablation(request: &Request<'_>) -> Result<Self, StudyError> {
+        let scene = Scene::Vehicle(Vehicle::new(Generator::Reject));
+        let drawn = (request.seed, request.runs);
+        let chosen = (request.methods, request.models);
+        Self::new("vehicle-ablation", scene, &Settings::REJECT, BTreeMap::new(), drawn, chosen)
+    }
+
     /// The study `aircraft`.
     pub(crate) fn aircraft(request: &Request<'_>) -> Result<Self, StudyError> {
         let heading = match request.set {

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 pub struct PublishedRow {
     /// Name of the method here.
     pub method: &'static str,
-    /// `vehicle` or `aircraft`.
+    /// `vehicle`, `aircraft` or `vehicle-ablation`.
     pub study: &'static str,
     /// Element error of the position, m.
     pub rmse_pos: f64,
@@ -24,8 +24,8 @@ const fn row(method: &'static str, study: &'static str, figures: [f64; 4]) -> Pu
     PublishedRow { method, study, rmse_pos, rmse_vel, iou, gwd }
 }
 
-/// Tables I (`vehicle`) and II (`aircraft`) of the RMMNet paper.
-pub const PUBLISHED: [PublishedRow; 16] = [
+/// Tables I (`vehicle`), II (`aircraft`) and III (`vehicle-ablation`) of the RMMNet paper.
+pub const PUBLISHED: [PublishedRow; 22] = [
     row("b-rmm-paper", "vehicle", [1.2891, 1.2143, 0.42173, 5.9499]),
     row("vb-rmm-paper", "vehicle", [0.6032, 5.1542, 0.60915, 2.5317]),
     row("imm-rmm-paper", "vehicle", [0.6038, 1.1618, 0.62819, 3.1245]),
@@ -42,6 +42,12 @@ pub const PUBLISHED: [PublishedRow; 16] = [
     row("lstm", "aircraft", [481.3142, 15.2947, 0.003592, 463_391.9]),
     row("transformer", "aircraft", [353.9528, 10.4817, 0.009948, 250_590.8]),
     row("rmmnet-paper", "aircraft", [6.4819, 3.2714, 0.557263, 263.9]),
+    row("full", "vehicle-ablation", [0.5933, 0.5910, 0.70425, 0.9182]),
+    row("without-prediction", "vehicle-ablation", [0.7689, 0.9232, 0.57742, 2.0453]),
+    row("without-update", "vehicle-ablation", [0.7548, 0.8341, 0.60361, 1.6239]),
+    row("without-memory", "vehicle-ablation", [1.0982, 0.9543, 0.52145, 4.3981]),
+    row("only-update", "vehicle-ablation", [1.2145, 1.1542, 0.43541, 5.0254]),
+    row("only-prediction", "vehicle-ablation", [1.1852, 1.0253, 0.45169, 5.3157]),
 ];
 
 impl PublishedRow {

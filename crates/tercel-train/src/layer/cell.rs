@@ -61,4 +61,23 @@ impl Cell {
             Self::Mlp([first, second]) => second.forward(weights, first.forward(weights, x)),
         }
     }
+
+    /// The outputs `[steps * batch, size]` of a sequence `[steps * batch, inputs]` whose steps take one unit of time each, from
+    /// a memory `[batch, size]`.
+    pub fn sequence(&self, weights: &Weights, x: Tensor, memory: Tensor) -> Tensor {
+        match self {
+            // Those take a whole sequence as one operation.
+            Self::Gru(_) | Self::Mlp(_) => self.step(weights, 1.0, x, memory),
+            Self::Ltc(_) | Self::Cfc(_) => {
+                let ([rows, inputs], batch) = (x.dims(), memory.dims()[0]);
+                let (mut memory, mut outputs) = (memory, Vec::with_capacity(rows / batch));
+                for first in (0..rows).step_by(batch) {
+                    let step = x.clone().slice([first..first + batch, 0..inputs]);
+                    memory = self.step(weights, 1.0, step, memory);
+                    outputs.push(memory.clone());
+                }
+                Tensor::cat(outputs, 0)
+            }
+        }
+    }
 }

@@ -7,7 +7,7 @@ use tercel_core::motion::AccelerationNoise;
 
 use crate::error::ModelError;
 use crate::filter::checked_positive;
-use crate::layer::LayerShape;
+use crate::layer::{CellShape, LayerShape, Solver};
 use crate::model::Model;
 
 /// Sizes and options of a [`NeuralImm`](super::NeuralImm): the table `hyper` of its card.
@@ -23,6 +23,8 @@ use crate::model::Model;
 /// input = 64                      # width of the first layer
 /// hidden = 64                     # width of each recurrent layer
 /// layers = 1                      # recurrent layers
+/// cell = { kind = "gru" }         # what they are made of; or { kind = "cfc", backbone = 64 }, or
+///                                 # { kind = "ltc", unfolds = 6, solver = "fused" }
 /// ```
 ///
 /// ```
@@ -60,6 +62,51 @@ pub struct NeuralImmHyper {
     pub hidden: usize,
     /// Number of recurrent layers.
     pub layers: usize,
+    /// What the recurrent layers are made of.
+    #[serde(default)]
+    pub cell: Recurrence,
+}
+
+/// What the recurrent layers of a network are made of. A step of them is a measurement, however long it was waited for: that is among
+/// the inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Recurrence {
+    /// Gated recurrent units.
+    #[default]
+    Gru,
+    /// Liquid neurons in closed form.
+    Cfc {
+        /// Width of the backbone.
+        backbone: usize,
+    },
+    /// Liquid neurons, whose equation is solved.
+    Ltc {
+        /// Steps in which it is solved.
+        unfolds: usize,
+        /// How it is solved.
+        solver: Solver,
+    },
+}
+
+impl Recurrence {
+    /// What the names of such layers begin with.
+    pub fn name(self) -> &'static str {
+        match self {
+            Recurrence::Gru => "gru",
+            Recurrence::Cfc { .. } => "cfc",
+            Recurrence::Ltc { .. } => "ltc",
+        }
+    }
+
+    /// A layer of this width.
+    pub fn shape(self, size: usize) -> CellShape {
+        match self {
+            Recurrence::Gru => CellShape::Gru { size },
+            Recurrence::Cfc { backbone } => CellShape::Cfc { size, backbone },
+            Recurrence::Ltc { unfolds, solver } => CellShape::Ltc { size, unfolds, solver },
+        }
+    }
 }
 
 impl Default for NeuralImmHyper {
@@ -76,6 +123,7 @@ impl Default for NeuralImmHyper {
             input: 64,
             hidden: 64,
             layers: 1,
+            cell: Recurrence::Gru,
         }
     }
 }
@@ -125,14 +173,19 @@ impl NeuralImmHyper {
         self.rates.len() + CORRECTIONS + SCALES
     }
 
+    /// The recurrent layers: name, width of an input row, and shape.
+    pub fn recurrent(&self) -> impl Iterator<Item = (String, usize, CellShape)> + '_ {
+        (0..self.layers).map(|layer| {
+            let inputs = if layer == 0 { self.input } else { self.hidden };
+            (format!("{}.{layer}", self.cell.name()), inputs, self.cell.shape(self.hidden))
+        })
+    }
+
     /// The layers of the network, by name: `input` (linear, ReLU), `gru.0`, `gru.1`, ..., `output` (linear).
     pub fn layers(&self) -> Vec<(String, LayerShape)> {
         let linear = |name: &str, inputs, outputs| (name.to_owned(), LayerShape::Linear { inputs, outputs });
         let mut layers = vec![linear("input", self.inputs(), self.input)];
-        for layer in 0..self.layers {
-            let inputs = if layer == 0 { self.input } else { self.hidden };
-            layers.push((format!("gru.{layer}"), LayerShape::Gru { inputs, size: self.hidden }));
-        }
+        layers.extend(self.recurrent().map(|(name, inputs, cell)| (name, cell.layer(inputs))));
         layers.push(linear("output", self.hidden, self.outputs()));
         layers
     }
@@ -157,7 +210,10 @@ impl NeuralImmHyper {
     pub fn check(&self) -> Result<(), String> {
         self.bank().map_err(|error| error.to_string())?;
         checked_positive(&[("unit", self.unit)])?;
-        for (name, size) in [("input", self.input), ("hidden", self.hidden), ("layers", self.layers)] {
+        let sizes = [("input", self.input), ("hidden", self.hidden), ("layers", self.layers)];
+        // The size of a cell is `hidden`.
+        let cells = self.cell.shape(self.hidden).sizes().into_iter().skip(1);
+        for (name, size) in sizes.into_iter().chain(cells) {
             if !(1..=1 << 16).contains(&size) {
                 return Err(format!("`{name}` is {size}; expected 1 to 65536"));
             }

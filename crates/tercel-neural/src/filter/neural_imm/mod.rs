@@ -16,7 +16,7 @@ use tercel_core::sensor::{Measurement, Sensor};
 use super::memory::{Memory, share};
 use hyper::{CORRECTIONS, SCALES};
 
-pub use hyper::NeuralImmHyper;
+pub use hyper::{NeuralImmHyper, Recurrence};
 pub use network::BankNetwork;
 pub use outlook::Outlook;
 

@@ -4,7 +4,7 @@ use super::hyper::NeuralImmHyper;
 use super::{KIND, LABELS};
 use crate::error::ModelError;
 use crate::filter::memory::Room;
-use crate::layer::{Gru, Linear};
+use crate::layer::{Cell, Linear, Tangents};
 use crate::model::Model;
 
 /// The network of a [`NeuralImm`](super::NeuralImm): from what a bank of filters says before and after a measurement to
@@ -15,7 +15,7 @@ use crate::model::Model;
 pub struct BankNetwork {
     hyper: NeuralImmHyper,
     input: Linear,
-    recurrent: Vec<Gru>,
+    recurrent: Vec<Cell>,
     output: Linear,
 }
 
@@ -30,13 +30,10 @@ impl BankNetwork {
         let hyper = NeuralImmHyper::of(model)?;
         let mut weights = model.weights();
         let input = weights.linear("input", hyper.inputs(), hyper.input)?;
-        let recurrent: Result<Vec<Gru>, ModelError> = (0..hyper.layers)
-            .map(|layer| {
-                let inputs = if layer == 0 { hyper.input } else { hyper.hidden };
-                weights.gru(&format!("gru.{layer}"), inputs, hyper.hidden)
-            })
-            .collect();
-        let recurrent = recurrent?;
+        let recurrent = hyper
+            .recurrent()
+            .map(|(name, inputs, shape)| weights.cell(&name, inputs, shape))
+            .collect::<Result<_, _>>()?;
         let output = weights.linear("output", hyper.hidden, hyper.outputs())?;
         weights.finish()?;
         Ok(BankNetwork { hyper, input, recurrent, output })
@@ -49,12 +46,12 @@ impl BankNetwork {
 
     /// Numbers of memory for one object.
     pub(super) fn memory(&self) -> usize {
-        self.recurrent.iter().map(Gru::size).sum()
+        self.recurrent.iter().map(Cell::size).sum()
     }
 
     /// Numbers of scratch space for a step of one object.
     pub(super) fn scratch(&self) -> usize {
-        self.hyper.input + self.recurrent.iter().map(|layer| layer.scratch(1)).max().unwrap_or(0)
+        self.hyper.input + self.recurrent.iter().map(|layer| layer.scratch(1, 0)).max().unwrap_or(0)
     }
 
     /// Moves the memory of one object on by one step, and writes the outputs.
@@ -65,7 +62,7 @@ impl BankNetwork {
         let (mut before, mut memory): (&[f32], &mut [f32]) = (first, memory);
         for layer in &self.recurrent {
             let (own, rest) = memory.split_at_mut(layer.size());
-            layer.step(before, own, room.0);
+            layer.step_along(1.0, before, own, Tangents::none(), room.0);
             (before, memory) = (own, rest);
         }
         self.output.forward(before, outputs);

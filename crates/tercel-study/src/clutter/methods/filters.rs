@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix4, Vector4};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Either, Extended, Imm, JumpMarkov, Kalman, Particle, Transition};
+use tercel_core::filter::{Extended, Imm, JumpMarkov, Kalman, Particle, Transition};
 use tercel_core::motion::{ConstantVelocity, LinearMotion, Motion, Turn};
 use tercel_core::sensor::Position;
 use tercel_neural::filter::{BankNetwork, LiquidKalman, LiquidMotion, LiquidNetwork, NeuralImm};
@@ -67,11 +67,12 @@ pub(super) fn liquid(
     })
 }
 
-/// A bank of turns whose estimate a network corrects.
+/// A wide bank of turns whose estimate a network corrects.
 pub(super) fn neural(
     models: &Models,
+    model: &str,
 ) -> Result<impl Fn(&Sensor) -> Result<NeuralImm<Position<2>>, FilterError> + use<>, StudyError> {
-    let network = Arc::new(BankNetwork::from_model(&models.get("neural-imm-position")?)?);
+    let network = Arc::new(BankNetwork::from_model(&models.get(model)?)?);
     Ok(move |sensor: &Sensor| NeuralImm::new(network.clone(), &[Position::new(sensor.deviation)?]))
 }
 
@@ -86,25 +87,7 @@ pub(super) fn wide(
     Ok(move |sensor: &Sensor| bank.filter(Position::new(sensor.deviation)?))
 }
 
-/// A learned motion beside the modes of [`BANK`].
-type Mode = Either<Kalman<Turn, Position<2>>, LiquidKalman<Position<2>>>;
-
-/// The modes of [`BANK`] and a learned motion as one more.
-pub(super) fn liquid_bank(
-    models: &Models,
-    model: &str,
-) -> Result<impl Fn(&Sensor) -> Result<Imm<Mode>, FilterError> + use<>, StudyError> {
-    let network = network(models, model)?;
-    Ok(move |sensor: &Sensor| {
-        let radar = Position::new(sensor.deviation)?;
-        let turn = |(rate, density): (f64, f64)| Turn::new(rate.to_radians(), density).with_speed(SPEED);
-        let modes = BANK.map(|mode| Either::Left(Kalman::new(turn(mode), radar)));
-        let learned = Either::Right(LiquidKalman::new(network.clone(), radar).with_speed(SPEED)?);
-        Imm::new(modes.into_iter().chain([learned]), Transition::sticky(STAY).per(1.0))
-    })
-}
-
-/// The same motion, of particles. The copies of resampling are spread as in [`cloud`].
+/// The motion of [`liquid`], of particles. The copies of resampling are spread as in [`cloud`].
 pub(super) fn liquid_cloud(
     models: &Models,
     model: &str,

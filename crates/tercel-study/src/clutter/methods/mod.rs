@@ -9,11 +9,12 @@
 //! | `imm..-paper` | the three modes of the publication with its transitions and noises, the acceleration known |
 //! | `lnn` | motion learned by a liquid network: [`LiquidKalman`](tercel_neural::filter::LiquidKalman) |
 //! | `lnn..-paper` | the same as published: no memory, fixed noise |
+//! | `cfc` | the same with liquid neurons in closed form |
 //! | `gru`, `mlp` | controls of the same size: gated units, and no memory |
-//! | `lnn-imm` | the modes of `imm` and the learned motion as one more |
 //! | `smc-imm`, `smc-lnn` | the modes of `imm`, and the learned motion, with 500 particles |
-//! | `neural` | a wide bank of turns whose estimate a network corrects: [`NeuralImm`](tercel_neural::filter::NeuralImm) |
-//! | `wide` | that bank without its network |
+//! | `lnn-imm` | a wide bank of turns whose estimate a liquid network corrects: [`NeuralImm`](tercel_neural::filter::NeuralImm) |
+//! | `neural` | its control: the same with gated units |
+//! | `wide` | that bank without a network |
 //!
 //! | tracker | |
 //! |---|---|
@@ -37,12 +38,13 @@ use tercel_neural::shipped::Models;
 use crate::error::StudyError;
 
 /// Names of all methods, in the order in which they are best read.
-pub const METHODS: [&str; 27] = [
+pub const METHODS: [&str; 29] = [
     "gm-phd",
     "imm-phd-paper",
     "lnn-phd-paper",
     "imm-phd",
     "lnn-phd",
+    "cfc-phd",
     "gru-phd",
     "mlp-phd",
     "lnn-imm-phd",
@@ -53,6 +55,7 @@ pub const METHODS: [&str; 27] = [
     "imm-member",
     "lnn-member-paper",
     "lnn-member",
+    "lnn-imm-member",
     "smc-imm-member",
     "smc-lnn-member-paper",
     "smc-lnn-member",
@@ -75,15 +78,16 @@ pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError
     use filters::{bank, cloud, published, straight};
     use trackers::{jpda, jpda_paper, multi_bernoulli, phd, pmbm};
     let liquid = |model| filters::liquid(models, model);
-    let liquid_bank = || filters::liquid_bank(models, "liquid");
     let liquid_cloud = |model| filters::liquid_cloud(models, model);
-    let neural = || filters::neural(models);
+    let neural = || filters::neural(models, "neural-imm-position");
+    let liquid_bank = || filters::neural(models, "neural-imm-liquid");
     Ok(match name {
         "gm-phd" => Box::new(Tracked::new(straight, phd)),
         "imm-phd-paper" => Box::new(Tracked::new(published, phd)),
         "lnn-phd-paper" => Box::new(Tracked::new(liquid("liquid-paper")?, phd)),
         "imm-phd" => Box::new(Tracked::new(bank, phd)),
         "lnn-phd" => Box::new(Tracked::new(liquid("liquid")?, phd)),
+        "cfc-phd" => Box::new(Tracked::new(liquid("liquid-cfc")?, phd)),
         "gru-phd" => Box::new(Tracked::new(liquid("liquid-gru")?, phd)),
         "mlp-phd" => Box::new(Tracked::new(liquid("liquid-mlp")?, phd)),
         "lnn-imm-phd" => Box::new(Tracked::new(liquid_bank()?, phd)),
@@ -94,6 +98,7 @@ pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError
         "imm-member" => Box::new(Tracked::new(bank, multi_bernoulli)),
         "lnn-member-paper" => Box::new(Tracked::new(liquid("liquid-paper")?, multi_bernoulli)),
         "lnn-member" => Box::new(Tracked::new(liquid("liquid")?, multi_bernoulli)),
+        "lnn-imm-member" => Box::new(Tracked::new(liquid_bank()?, multi_bernoulli)),
         "smc-imm-member" => Box::new(Tracked::new(cloud, multi_bernoulli)),
         "smc-lnn-member-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, multi_bernoulli)),
         "smc-lnn-member" => Box::new(Tracked::new(liquid_cloud("liquid")?, multi_bernoulli)),

@@ -12,6 +12,7 @@
 //! | `mem-rbpf`, `mem-rbpf-paper` | | multiplicative error with particles of the angle (Steuernagel and Baum) |
 //! | `rmmnet-paper` | | RMMNet as published |
 //! | `rmmnet` | | random matrix with a learned memory, which also sees the points themselves |
+//! | `rmmnet-imitation-1`, `-3`, `-5`, `-10` | | the same, trained on tracks that were simulated from so many weights of recorded ones |
 //! | `known-size` | the size | the angle of the scan's greatest likelihood; for aircraft that of the course |
 //! | `aligned` | the size | the angle of velocity and scan together |
 //! | `aligned-ar` | the size | the same with an auto-regressive motion of order 10 that is identified on line |
@@ -56,7 +57,35 @@ pub const VEHICLE_METHODS: [&str; 20] = [
 ];
 
 /// Names of all methods of the study `aircraft`: nobody knows the true motion there.
-pub const AIRCRAFT_METHODS: &[&str] = VEHICLE_METHODS.split_at(19).0;
+pub const AIRCRAFT_METHODS: [&str; 23] = [
+    "centroid",
+    "b-rmm-paper",
+    "vb-rmm-paper",
+    "lan-li-paper",
+    "imm-rmm-paper",
+    "mem-ekf-paper",
+    "mem-rbpf-paper",
+    "rmmnet-paper",
+    "b-rmm",
+    "ffk-rmm",
+    "vb-rmm",
+    "lan-li",
+    "imm-rmm",
+    "mem-ekf",
+    "mem-rbpf",
+    "rmmnet",
+    "rmmnet-imitation-1",
+    "rmmnet-imitation-3",
+    "rmmnet-imitation-5",
+    "rmmnet-imitation-10",
+    "known-size",
+    "aligned",
+    "aligned-ar",
+];
+
+/// Names of all methods of the study `vehicle-ablation`: RMMNet as published, small, and without some of its blocks.
+pub const ABLATION: [&str; 6] =
+    ["full", "without-prediction", "without-update", "without-memory", "only-update", "only-prediction"];
 
 /// The method of that name, with these numbers.
 ///
@@ -85,13 +114,20 @@ pub(crate) fn method(
         "mem-rbpf" => Box::new(shape::Sampled { settings, paper: false }),
         "mem-rbpf-paper" => Box::new(shape::Sampled { settings, paper: true }),
         "rmmnet-paper" => Box::new(learned::Remembering::new(models, settings.rmmnet_paper)?),
+        name if ABLATION.contains(&name) => {
+            Box::new(learned::Remembering::new(models, &format!("rmmnet-ablation-{name}"))?)
+        }
         "rmmnet" => Box::new(learned::Remembering::new(models, settings.rmmnet)?),
+        name if name.starts_with("rmmnet-imitation-") && AIRCRAFT_METHODS.contains(&name) => {
+            Box::new(learned::Remembering::new(models, name)?)
+        }
         "known-size" => Box::new(known::Sized(settings)),
         "aligned" => Box::new(known::Straight(settings)),
         "aligned-ar" => Box::new(known::Regressive(settings)),
         "oracle" => Box::new(known::Oracle),
         _ => {
-            let known = VEHICLE_METHODS.join(", ");
+            let known =
+                if study == "vehicle-ablation" { ABLATION.join(", ") } else { VEHICLE_METHODS.join(", ") };
             return Err(StudyError::UnknownMethod { study, name: name.to_owned(), known });
         }
     })

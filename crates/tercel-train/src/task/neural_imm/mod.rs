@@ -34,7 +34,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use serde::Deserialize;
-use tercel_neural::filter::{BankNetwork, NeuralImmHyper};
+use tercel_neural::filter::{BankNetwork, NeuralImmHyper, Recurrence};
 use tercel_neural::{Card, Model, Tensor as Stored};
 
 use data::{BankData, Followed};
@@ -43,7 +43,7 @@ use mixture::{COLUMNS, Mixture};
 
 use crate::backend::{apply, constant, values};
 use crate::check::{at_least, positive};
-use crate::layer::{Activation, Gru, Linear, numbered};
+use crate::layer::{Activation, Cell, Linear};
 use crate::recipe::{Kind, Recipe};
 use crate::trainer::{self, Draw, Loss, Progress, Run, Split, Summary, Task};
 use crate::{Initial, ParameterSet, TrainError, Weights};
@@ -88,7 +88,7 @@ pub struct NeuralImmTask {
     loss: NeuralImmLoss,
     data: BankData,
     input: Linear,
-    recurrent: Vec<Gru>,
+    recurrent: Vec<Cell>,
     output: Linear,
 }
 
@@ -110,11 +110,9 @@ impl NeuralImmTask {
         let data = BankData::new(&recipe.data, recipe.seed, &network)?;
         let mut set = ParameterSet::new(recipe.seed);
         let input = Linear::new(&mut set, "input", hyper.inputs(), hyper.input, Activation::Relu)?;
-        let recurrent = (0..hyper.layers)
-            .map(|layer| {
-                let inputs = if layer == 0 { hyper.input } else { hyper.hidden };
-                Gru::new(&mut set, &numbered("gru", layer), inputs, hyper.hidden)
-            })
+        let recurrent = hyper
+            .recurrent()
+            .map(|(name, inputs, shape)| Cell::new(&mut set, &name, inputs, shape))
             .collect::<Result<_, _>>()?;
         let (sizes, zeros) =
             ([hyper.hidden, hyper.outputs()], [Initial::Constant(0.0), Initial::Constant(0.0)]);
@@ -125,7 +123,7 @@ impl NeuralImmTask {
 
 /// A network of the same inputs and outputs that costs next to nothing: the data needs the bank alone.
 fn smallest(hyper: &NeuralImmHyper) -> Result<BankNetwork, TrainError> {
-    let hyper = NeuralImmHyper { input: 1, hidden: 1, layers: 1, ..hyper.clone() };
+    let hyper = NeuralImmHyper { input: 1, hidden: 1, layers: 1, cell: Recurrence::Gru, ..hyper.clone() };
     let zeros = |shape: Vec<usize>| Stored { values: vec![0.0; shape.iter().product()], shape };
     let tensors: BTreeMap<_, _> =
         hyper.tensors().into_iter().map(|(name, shape)| (name, zeros(shape))).collect();
@@ -170,7 +168,8 @@ impl Task for NeuralImmTask {
         let inputs = constant(followed.inputs.clone(), [rows, followed.width()]);
         let mut x = self.input.forward(weights, inputs);
         for layer in &self.recurrent {
-            x = layer.forward(weights, x, layer.zero(followed.members));
+            let memory = Cell::zero(followed.members, self.hyper.cell.shape(self.hyper.hidden));
+            x = layer.sequence(weights, x, memory);
         }
         let outputs = self.output.forward(weights, x);
         let mixture = Mixture { followed: followed.clone(), loss: self.loss.clone() };

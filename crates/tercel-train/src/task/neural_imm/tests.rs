@@ -89,11 +89,18 @@ fn a_network_that_was_not_trained_is_the_bank() {
 /// The differentiable model and the filter give the same: the outputs at each update, and the errors that follow.
 #[test]
 fn the_filter_says_what_was_trained() {
-    let (task, mut set) = task();
-    for (index, (_, values)) in set.values_mut().enumerate() {
-        values.iter_mut().enumerate().for_each(|(i, value)| *value += 0.1 * ((i + index) as f32).sin());
+    for cell in [
+        "{ kind = \"gru\" }",
+        "{ kind = \"cfc\", backbone = 7 }",
+        "{ kind = \"ltc\", unfolds = 3, solver = \"fused\" }",
+    ] {
+        let text = format!("{RECIPE}cell = {cell}\n");
+        let (task, mut set) = NeuralImmTask::new(&Recipe::parse(&text).unwrap()).unwrap();
+        for (index, (_, values)) in set.values_mut().enumerate() {
+            values.iter_mut().enumerate().for_each(|(i, value)| *value += 0.1 * ((i + index) as f32).sin());
+        }
+        agree(&task, &set, 40);
     }
-    agree(&task, &set, 40);
 }
 
 #[test]
@@ -123,7 +130,7 @@ fn agree(task: &NeuralImmTask, set: &ParameterSet, steps: usize) {
     let weights = Weights::frozen(set);
     let mut x = task.input.forward(&weights, constant(inputs, [steps - 1, task.hyper.inputs()]));
     for layer in &task.recurrent {
-        x = layer.forward(&weights, x, layer.zero(1));
+        x = layer.sequence(&weights, x, Cell::zero(1, task.hyper.cell.shape(task.hyper.hidden)));
     }
     for (trained, ran) in values(&task.output.forward(&weights, x)).iter().zip(&outputs) {
         assert!((trained - ran).abs() < 1e-4 * ran.abs().max(0.1), "{trained} {ran}");

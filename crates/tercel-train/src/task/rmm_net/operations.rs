@@ -115,15 +115,23 @@ impl Operation<4> for Step {
 pub struct PublishedStep {
     pub options: Arc<Published>,
     pub dt: f64,
-    /// The scans, where they have points, and by how much the origins move.
-    pub seen: Arc<Vec<(Option<Moments>, [f64; 2])>>,
+    pub seen: Arc<Vec<Scan>>,
+}
+
+/// What counts as given in the published step of one member.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// The scan, if it has points.
+    pub moments: Option<Moments>,
+    /// By how much the origin moves.
+    pub shift: [f64; 2],
 }
 
 impl Rows<3, EXTENDED> for PublishedStep {
     fn of<T: Number>(&self, member: usize, [before, prediction, scan]: [&[T]; 3]) -> [T; EXTENDED] {
         let prior = extended(before).predict(&self.options, prediction, self.dt);
-        let (seen, shift) = &self.seen[member];
-        let after = seen.as_ref().map(|seen| prior.update(&self.options, seen, scan));
+        let Scan { moments, shift } = &self.seen[member];
+        let after = moments.as_ref().map(|seen| prior.update(&self.options, seen, scan));
         shifted(extended_numbers(&after.unwrap_or(prior)), *shift)
     }
 }

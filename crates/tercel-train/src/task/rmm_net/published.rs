@@ -8,7 +8,7 @@ use tercel_neural::filter::rmm_net::{Extended, Kinematics, Moments, Published, w
 use super::State;
 use super::data::Rides;
 use super::head::Head;
-use super::operations::PublishedStep;
+use super::operations::{PublishedStep, Scan};
 use super::rows::{EXTENDED, extended, extended_numbers, shifted, wide};
 use crate::backend::{Tensor, apply, constant};
 use crate::layer::{Lstm, LstmState};
@@ -103,14 +103,14 @@ impl PublishedNet {
             }
             None => constant(vec![0.0; members * widths::PREDICTED], [members, widths::PREDICTED]),
         };
-        let (moments, scans) = self.see_scans((&before, &origins), &wide(&prediction), &rides.scans[step]);
+        let (seen, scans) = self.see_scans((&before, &origins), &wide(&prediction), &rides.scans[step]);
         let scan = match &self.update {
             Some(head) => head.say(weights, vec![constant(scans, [members, widths::SCAN_SEEN]), context]).1,
             None => constant(vec![0.0; members * widths::SAID[3]], [members, widths::SAID[3]]),
         };
-        let operation = PublishedStep { options: Arc::clone(options), dt: self.dt, seen: Arc::new(moments) };
-        for (origin, (_, shift)) in origins.iter_mut().zip(operation.seen.iter()) {
-            (0..2).for_each(|i| origin[i] += shift[i]);
+        let operation = PublishedStep { options: Arc::clone(options), dt: self.dt, seen: Arc::new(seen) };
+        for (origin, scan) in origins.iter_mut().zip(operation.seen.iter()) {
+            (0..2).for_each(|i| origin[i] += scan.shift[i]);
         }
         let row = apply(operation, [tracks, prediction, scan]);
         (State { tracks: row.clone(), memory, origins, known }, row)
@@ -122,10 +122,10 @@ impl PublishedNet {
         (before, origins): (&[Extended<f64>], &[[f64; 2]]),
         said: &[Vec<f64>],
         scans: &[Points],
-    ) -> (Vec<(Option<Moments>, [f64; 2])>, Vec<f32>) {
+    ) -> (Vec<Scan>, Vec<f32>) {
         let (scale, noise) = (self.scattering.scale(), self.scattering.noise());
         let mut rows = vec![0.0; scans.len() * widths::SCAN_SEEN];
-        let mut moments = Vec::with_capacity(scans.len());
+        let mut seen = Vec::with_capacity(scans.len());
         for (member, row) in rows.chunks_exact_mut(widths::SCAN_SEEN).enumerate() {
             let points = &scans[member];
             let prior = before[member].predict(&self.options, &said[member], self.dt);
@@ -136,8 +136,8 @@ impl PublishedNet {
             if let Some(own) = &own {
                 self.options.see_scan(&prior, own, row);
             }
-            moments.push((own, prior.motion.place));
+            seen.push(Scan { moments: own, shift: prior.motion.place });
         }
-        (moments, rows)
+        (seen, rows)
     }
 }
