@@ -27,7 +27,7 @@ const LEAST: f64 = 1e-3;
 /// Share of an interval below which two scans say nothing of a velocity.
 const MOMENT: f64 = 0.1;
 
-/// State and extent of an object, relative to an origin.
+/// State and extent of an object, relative to an origin: that of the absolute frame, or the last centroid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Told<T> {
     /// Position, m.

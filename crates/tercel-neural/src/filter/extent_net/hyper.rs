@@ -13,6 +13,7 @@ use crate::model::Model;
 /// ```toml
 /// interval = 1.0          # the time step that the network was trained for, s
 /// frame = "residual"      # or "absolute"
+/// origin = [0.0, 0.0]     # what positions are relative to in the absolute frame, m
 /// position = 2.0          # unit of positions, m
 /// velocity = 3.0          # unit of velocities, m/s
 /// change = 1.5            # unit of differences of velocities, m/s
@@ -36,6 +37,9 @@ pub struct ExtentNetHyper {
     pub interval: f64,
     /// What positions and velocities are relative to.
     pub frame: Frame,
+    /// What positions are relative to in the absolute frame, m.
+    #[serde(default)]
+    pub origin: [f64; 2],
     /// Unit of positions, m.
     pub position: f64,
     /// Unit of velocities, m/s.
@@ -58,7 +62,7 @@ pub struct ExtentNetHyper {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Frame {
-    /// The origin of the plane, and rest: as published.
+    /// A fixed origin, and rest: as published.
     Absolute,
     /// The centroid of the scan, and its way since the scan before.
     Residual,
@@ -103,6 +107,7 @@ impl Default for ExtentNetHyper {
         ExtentNetHyper {
             interval: 1.0,
             frame: Frame::Residual,
+            origin: [0.0; 2],
             position: 2.0,
             velocity: 3.0,
             change: 1.5,
@@ -172,6 +177,9 @@ impl ExtentNetHyper {
             ("worth", self.worth),
             ("speed", self.speed),
         ])?;
+        if let Some(value) = self.origin.iter().find(|value| !value.is_finite()) {
+            return Err(format!("`origin` has {value}; expected finite numbers"));
+        }
         match &self.architecture {
             Architecture::Lstm { units } => checked_sizes(&[("architecture.units", *units)]),
             Architecture::Transformer { size, heads, layers, feed, window } => {

@@ -156,9 +156,8 @@ impl ExtentNet {
     /// Lets the network see a scan with points.
     fn see(&self, belief: &mut ExtentNetBelief, points: &Points) {
         let hyper = self.network.hyper();
-        // The units of single precision are spent on what is near.
         let origin = match hyper.frame {
-            Frame::Absolute => [0.0; 2],
+            Frame::Absolute => hyper.origin,
             Frame::Residual => belief.centre,
         };
         let prior = belief.told(origin);

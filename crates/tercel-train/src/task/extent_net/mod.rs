@@ -80,7 +80,7 @@ pub struct State {
 /// What is known of a member beside its estimate.
 #[derive(Debug, Clone, Copy)]
 struct Known {
-    /// Where the origin is, m: that of the plane, or the last centroid.
+    /// Where the origin is, m: that of the absolute frame, or the last centroid.
     origin: [f64; 2],
     /// The last centroid, m, and the time since then, s.
     centre: [f64; 2],
@@ -151,7 +151,7 @@ impl ExtentNetTask {
     /// Where the origin is after a scan with this centroid.
     fn origin(&self, centre: [f64; 2]) -> [f64; 2] {
         match self.hyper.frame {
-            Frame::Absolute => [0.0; 2],
+            Frame::Absolute => self.hyper.origin,
             Frame::Residual => centre,
         }
     }
