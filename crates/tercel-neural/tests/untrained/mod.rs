@@ -241,8 +241,8 @@ pub fn small_extent_nets(frame: Frame) -> [ExtentNetHyper; 2] {
         extent_net::Architecture::Lstm { units: 8 },
         extent_net::Architecture::Transformer { size: 12, heads: 3, layers: 2, feed: 10, window: 7 },
     ];
-    let position = if frame == Frame::Absolute { 5000.0 } else { 10.0 };
+    let position = if frame == Frame::Absolute { 5000.0 } else { 20.0 };
     let units =
-        ExtentNetHyper { frame, position, velocity: 20.0, change: 5.0, speed: 20.0, ..Default::default() };
+        ExtentNetHyper { frame, position, velocity: 20.0, change: 12.0, speed: 20.0, ..Default::default() };
     architectures.map(|architecture| ExtentNetHyper { architecture, ..units.clone() })
 }
