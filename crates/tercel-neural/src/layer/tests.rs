@@ -258,9 +258,9 @@ fn attention_with_a_cache_is_the_definition_over_the_last_steps_however_many_cam
             };
             let shares: Vec<f64> = seen.iter().map(share).collect();
             let sum: f64 = shares.iter().sum();
-            for c in 4 * head..4 * head + 4 {
+            for (c, mixed) in mixed.iter_mut().enumerate().skip(4 * head).take(4) {
                 let values = seen.iter().map(|before| project(row(*before), 2)[c]);
-                mixed[c] = values.zip(&shares).map(|(v, s)| v * s / sum).sum::<f64>() as f32;
+                *mixed = values.zip(&shares).map(|(v, s)| v * s / sum).sum::<f64>() as f32;
             }
         }
         close(&y, &project(&mixed, 3), 1e-5);
