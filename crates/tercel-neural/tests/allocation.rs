@@ -9,9 +9,11 @@ use tercel_core::extended::{Points, Scattering};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::{ConvertedPolar, Measurement, RangeBearing};
+use tercel_neural::filter::extent_net::Frame;
 use tercel_neural::filter::{
-    Architecture, Covariance, DeepMtt, DeepMttHyper, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
-    LiquidKalman, MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, RmmNet, TrMtt, TrMttHyper,
+    Architecture, Covariance, DeepMtt, DeepMttHyper, EnsKNets, EnsKNetsHyper, ExtentNet, KalmanNet,
+    KalmanNetHyper, LiquidKalman, MnemonicHyper, MnemonicKalman, NeuralImm, NeuralImmHyper, RmmNet, TrMtt,
+    TrMttHyper,
 };
 use untrained::{TINY_ONE, network, tiny};
 
@@ -106,10 +108,8 @@ fn liquid_filters_do_not_allocate() {
     }
 }
 
-#[test]
-fn rmm_nets_do_not_allocate_with_twenty_points_one_or_none() {
-    let points = Scattering::uniform(nalgebra::Matrix2::identity()).unwrap();
-    let filter = RmmNet::new(untrained::rmm_net(&untrained::small_rmm_net(), 0.5), points);
+/// Allocations in 100 rounds of twenty points, one and none, after ten.
+fn allocations_with_points<F: Filter<4, Measurement = Points>>(filter: &F) -> u64 {
     let seen: Points = (0..20).map(|i| [100.0 + f64::from(i % 5), 50.0 + f64::from(i % 7)]).collect();
     let scans = [seen, Points::from_iter([[101.0, 51.0]]), Points::default()];
     let mut belief = filter.birth(&scans[1]).unwrap();
@@ -124,5 +124,21 @@ fn rmm_nets_do_not_allocate_with_twenty_points_one_or_none() {
     (0..10).for_each(|_| {
         step();
     });
-    assert_eq!(measure(|| (0..100).for_each(|_| assert!(step().mean[0].is_finite()))).count_total, 0);
+    measure(|| (0..100).for_each(|_| assert!(step().mean[0].is_finite()))).count_total
+}
+
+#[test]
+fn rmm_nets_do_not_allocate_with_twenty_points_one_or_none() {
+    let points = Scattering::uniform(nalgebra::Matrix2::identity()).unwrap();
+    let network = untrained::rmm_net(&untrained::small_rmm_net(), 0.5);
+    assert_eq!(allocations_with_points(&RmmNet::new(network, points)), 0);
+}
+
+#[test]
+fn extent_nets_do_not_allocate_with_twenty_points_one_or_none() {
+    let points = Scattering::uniform(nalgebra::Matrix2::identity()).unwrap();
+    for hyper in [Frame::Absolute, Frame::Residual].into_iter().flat_map(untrained::small_extent_nets) {
+        let network = untrained::extent_net(&hyper, 0.5);
+        assert_eq!(allocations_with_points(&ExtentNet::new(network, points)), 0, "{hyper:?}");
+    }
 }

@@ -10,9 +10,10 @@ use tercel_core::conformance::{Expectations, Problem, positions};
 use tercel_core::filter::{Imm, Transition};
 use tercel_core::motion::ConstantVelocity;
 use tercel_core::sensor::Position;
+use tercel_neural::filter::extent_net::Frame;
 use tercel_neural::filter::{
-    Architecture, Covariance, DeepMtt, Derivative, EnsKNets, EnsKNetsHyper, KalmanNet, KalmanNetHyper,
-    LiquidHyper, LiquidKalman, MnemonicKalman, NeuralImm, Normalisation, RmmNet, TrMtt,
+    Architecture, Covariance, DeepMtt, Derivative, EnsKNets, EnsKNetsHyper, ExtentNet, KalmanNet,
+    KalmanNetHyper, LiquidHyper, LiquidKalman, MnemonicKalman, NeuralImm, Normalisation, RmmNet, TrMtt,
 };
 use untrained::{TINY_ONE, TINY_TWO, network, tiny};
 
@@ -155,4 +156,25 @@ conformance!(rmm_net_on_single_points, extended::own::<4, _, _>(rmm_net));
 conformance!(
     imm_of_rmm_nets,
     extended::own::<4, _, _>(|p| Imm::new([rmm_net(p), rmm_net(p)], Transition::sticky(0.95)).unwrap())
+);
+
+#[allow(clippy::unwrap_used)]
+fn extent_net(problem: &Problem, frame: Frame, memory: usize) -> ExtentNet {
+    let scattering = tercel_core::extended::Scattering::uniform(problem.noise() * 0.5).unwrap();
+    // Networks that were not trained do not know how far off they are; small weights keep them near.
+    let size = if frame == Frame::Absolute { 0.05 } else { 0.1 };
+    let hyper = &untrained::small_extent_nets(frame)[memory];
+    ExtentNet::new(untrained::extent_net(hyper, size), scattering)
+}
+
+conformance!(lstm_alone, extended::own::<4, _, _>(|p| extent_net(p, Frame::Residual, 0)));
+conformance!(transformer_alone, extended::own::<4, _, _>(|p| extent_net(p, Frame::Residual, 1)));
+conformance!(lstm_of_the_publication, extended::own::<4, _, _>(|p| extent_net(p, Frame::Absolute, 0)));
+conformance!(transformer_of_the_publication, extended::own::<4, _, _>(|p| extent_net(p, Frame::Absolute, 1)));
+conformance!(
+    imm_of_transformers,
+    extended::own::<4, _, _>(|p| {
+        let modes = [0, 1].map(|_| extent_net(p, Frame::Residual, 1));
+        Imm::new(modes, Transition::sticky(0.95)).unwrap()
+    })
 );

@@ -3,6 +3,7 @@
 //! | filter | learns | belief |
 //! |---|---|---|
 //! | [`DeepMtt`] | residuals of an unscented filter, from a window | Gaussian, last estimates |
+//! | [`ExtentNet`] | everything of an extended object, from what it saw and said | last estimate, extent, cells or keys and values |
 //! | [`KalmanNet`] | the gain | Gaussian, last differences, memory of a recurrent network |
 //! | [`EnsKNets`] | the mixture of KalmanNets, with or without attention | that of each KalmanNet, memories of two branches |
 //! | [`LiquidKalman`] | the motion, in a network of continuous time or a control | Gaussian, memory of the network |
@@ -17,6 +18,7 @@
 
 mod deep_mtt;
 mod ens_knets;
+pub mod extent_net;
 mod kalman_net;
 mod liquid;
 mod memory;
@@ -31,6 +33,7 @@ pub use ens_knets::{
     Attention, BranchHyper, EnsKNets, EnsKNetsBelief, EnsKNetsHyper, EnsembleNetwork, Evidence,
     Normalisation, OfflineEnsKNets, Sign,
 };
+pub use extent_net::{ExtentNet, ExtentNetBelief, ExtentNetHyper, ExtentNetwork};
 pub use kalman_net::{
     Architecture, Covariance, Feature, GainNetwork, KalmanNet, KalmanNetBelief, KalmanNetHyper,
 };
@@ -54,8 +57,17 @@ use crate::model::Model;
 const LABELS: [&str; 4] = ["x", "y", "vx", "vy"];
 
 /// The kinds of models that there are filters for.
-pub const KINDS: [&str; 8] =
-    ["deep-mtt", "ens-knets", "kalman-net", "liquid", "mnemonic", "neural-imm", "rmmnet", "tr-mtt"];
+pub const KINDS: [&str; 9] = [
+    "deep-mtt",
+    "ens-knets",
+    "extent-net",
+    "kalman-net",
+    "liquid",
+    "mnemonic",
+    "neural-imm",
+    "rmmnet",
+    "tr-mtt",
+];
 
 /// Accepts a model of which a filter can be made.
 ///
@@ -65,6 +77,7 @@ pub fn check(model: &Model) -> Result<(), ModelError> {
     match model.card().kind.as_str() {
         "deep-mtt" => ResidualNetwork::from_model(model).map(drop),
         "ens-knets" => EnsembleNetwork::from_model(model).map(drop),
+        "extent-net" => ExtentNetwork::from_model(model).map(drop),
         "kalman-net" => GainNetwork::from_model(model).map(drop),
         "liquid" => LiquidNetwork::from_model(model).map(drop),
         "mnemonic" => MnemonicNetwork::from_model(model).map(drop),

@@ -9,6 +9,7 @@
 //! | [`sigmoid`] | 1.5e-7 absolute | 0 within 2e-38, and 1 |
 //! | [`tanh`] | 2e-7 relative | -1 and 1 |
 //! | [`softplus`] | 3e-7 relative, above -87 | 0 within 2e-38, and `x` |
+//! | [`silu`] | 3e-7 relative, above -87 | 0 within 4e-36, and `x` |
 //!
 //! What is not a number stays so.
 
@@ -39,6 +40,11 @@ pub fn softplus(values: &mut [f32]) {
     dispatch(Pass(values, Activation::Softplus));
 }
 
+/// Replaces each number by `x / (1 + e⁻ˣ)`.
+pub fn silu(values: &mut [f32]) {
+    dispatch(Pass(values, Activation::Silu));
+}
+
 /// Replaces each row of `width` numbers by `exp(xᵢ) / Σⱼ exp(xⱼ)`.
 ///
 /// Rows may hold `-∞`, which gets no share; a row of nothing else has no shares and becomes not a number.
@@ -62,6 +68,7 @@ enum Activation {
     Sigmoid,
     Tanh,
     Softplus,
+    Silu,
 }
 
 struct Pass<'a>(&'a mut [f32], Activation);
@@ -75,6 +82,7 @@ impl Kernel for Pass<'_> {
             Activation::Sigmoid => sigmoid_pass::<A>(self.0),
             Activation::Tanh => tanh_pass::<A>(self.0),
             Activation::Softplus => self.0.iter_mut().for_each(|x| *x = softplus_of::<A>(*x)),
+            Activation::Silu => self.0.iter_mut().for_each(|x| *x = silu_of::<A>(*x)),
         }
     }
 }
@@ -159,6 +167,12 @@ fn tanh_of<A: Arithmetic>(x: f32) -> f32 {
 }
 
 #[inline(always)]
+fn silu_of<A: Arithmetic>(x: f32) -> f32 {
+    // Beyond the range of the exponential the product would grow again.
+    x.max(-200.0) / (1.0 + exp_within::<A>(-x))
+}
+
+#[inline(always)]
 fn softplus_of<A: Arithmetic>(x: f32) -> f32 {
     // ln(1 + eˣ) = max(x, 0) + ln(1 + u), u = e^-|x|, and ln(1 + u) = 2 artanh s with s = u / (2 + u) up to 1/3.
     let u = exp_within::<A>(-x.abs());
@@ -235,6 +249,10 @@ mod tests {
         let exact = |x: f64| x.max(0.0) + (-x.abs()).exp().ln_1p();
         let error = worst(|| Activation::Softplus, exact, |x, y| if x < -87.0 { 1e30 } else { y });
         assert!(error < 3e-7, "softplus: {error:e}");
+        let exact = |x: f64| x / (1.0 + (-x).exp());
+        let scale = |x: f64, y: f64| if x < -87.0 { 1e30 } else { y.abs().max(f64::from(f32::MIN_POSITIVE)) };
+        let error = worst(|| Activation::Silu, exact, scale);
+        assert!(error < 3e-7, "silu: {error:e}");
     }
 
     #[test]
@@ -256,6 +274,12 @@ mod tests {
                 "{y:?}"
             );
         }
+        for y in both(|| Activation::Silu, &ends) {
+            assert!(
+                y[..3].iter().all(|y| (-2e-35..=0.0).contains(y)) && y[3..] == [200.0, 1e30, infinite],
+                "{y:?}"
+            );
+        }
         for y in both(|| Activation::Relu, &ends) {
             assert_eq!(y, [0.0, 0.0, 0.0, 200.0, 1e30, infinite]);
         }
@@ -263,12 +287,13 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_stays_so() {
-        let all: [fn() -> Activation; 5] = [
+        let all: [fn() -> Activation; 6] = [
             || Activation::Relu,
             || Activation::Exp,
             || Activation::Sigmoid,
             || Activation::Tanh,
             || Activation::Softplus,
+            || Activation::Silu,
         ];
         for activation in all {
             for y in both(activation, &[f32::NAN; 9]) {

@@ -114,11 +114,11 @@ impl Attention {
 }
 
 /// Scaled products of a query with all keys, which lie column by column.
-struct Scores<'a> {
-    query: &'a [f32],
-    columns: &'a [f32],
-    scale: f32,
-    shares: &'a mut [f32],
+pub(super) struct Scores<'a> {
+    pub query: &'a [f32],
+    pub columns: &'a [f32],
+    pub scale: f32,
+    pub shares: &'a mut [f32],
 }
 
 impl Kernel for Scores<'_> {
@@ -134,12 +134,12 @@ impl Kernel for Scores<'_> {
 }
 
 /// The mean of the values under the shares, for the columns of one head.
-struct Mix<'a> {
-    shares: &'a [f32],
-    values: &'a [f32],
-    size: usize,
-    own: std::ops::Range<usize>,
-    mixed: &'a mut [f32],
+pub(super) struct Mix<'a> {
+    pub shares: &'a [f32],
+    pub values: &'a [f32],
+    pub size: usize,
+    pub own: std::ops::Range<usize>,
+    pub mixed: &'a mut [f32],
 }
 
 impl Kernel for Mix<'_> {

@@ -10,7 +10,9 @@
 //! | [`Mlp`] | nothing |
 //! | [`Bidirectional`] | nothing: takes a whole window |
 //! | [`Attention`] | nothing: takes a whole window |
-//! | [`LayerNorm`] | nothing |
+//! | [`RotaryAttention`] | keys and values of its last rows: [`KeyValues`] |
+//! | [`SwiGlu`] | nothing |
+//! | [`LayerNorm`], [`RmsNorm`] | nothing |
 //! | [`RunningNorm`] | count, means and squares of its channels |
 //! | [`activation`] | nothing: passes over a slice |
 //!
@@ -39,8 +41,11 @@ mod lstm;
 mod ltc;
 mod matrix;
 mod mlp;
+mod rms_norm;
+mod rotary_attention;
 mod running_norm;
 mod shape;
+mod swi_glu;
 mod synapses;
 mod tangents;
 #[cfg(test)]
@@ -56,8 +61,11 @@ pub use linear::Linear;
 pub use lstm::Lstm;
 pub use ltc::{Ltc, LtcWeights, Solver};
 pub use mlp::Mlp;
+pub use rms_norm::RmsNorm;
+pub use rotary_attention::{KeyValues, RotaryAttention, rotate};
 pub use running_norm::RunningNorm;
 pub use shape::LayerShape;
+pub use swi_glu::SwiGlu;
 pub use synapses::SynapseWeights;
 pub use tangents::Tangents;
 

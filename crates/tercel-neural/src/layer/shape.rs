@@ -2,7 +2,7 @@
 
 use super::{
     Attention, Bidirectional, Cell, CellShape, Cfc, Gru, LayerNorm, Linear, Lstm, Ltc, LtcWeights, Mlp,
-    SynapseWeights,
+    RmsNorm, RotaryAttention, SwiGlu, SynapseWeights,
 };
 use crate::error::ModelError;
 use crate::model::Weights;
@@ -72,8 +72,20 @@ pub enum LayerShape {
         /// Width of the output of each half.
         size: usize,
     },
-    /// An [`Attention`] layer.
+    /// An [`Attention`] or [`RotaryAttention`] layer.
     Attention {
+        /// Width of a row.
+        size: usize,
+    },
+    /// A [`SwiGlu`].
+    SwiGlu {
+        /// Width of a row.
+        size: usize,
+        /// Width inside.
+        hidden: usize,
+    },
+    /// An [`RmsNorm`].
+    RmsNorm {
         /// Width of a row.
         size: usize,
     },
@@ -107,6 +119,11 @@ impl LayerShape {
                 let part = LayerShape::Linear { inputs: size, outputs: size };
                 return within(&[("query", part), ("key", part), ("value", part), ("output", part)]);
             }
+            LayerShape::SwiGlu { size, hidden } => {
+                let part = LayerShape::Linear { inputs: size, outputs: hidden };
+                let output = LayerShape::Linear { inputs: hidden, outputs: size };
+                return within(&[("gate", part), ("value", part), ("output", output)]);
+            }
             LayerShape::Mlp { inputs, hidden, size } => {
                 let first = LayerShape::Linear { inputs, outputs: hidden };
                 return within(&[
@@ -130,6 +147,7 @@ impl LayerShape {
                     ("heads_bias", vec![heads]),
                 ]
             }
+            LayerShape::RmsNorm { size } => vec![("weight", vec![size])],
             LayerShape::LayerNorm { size } => vec![("weight", vec![size]), ("bias", vec![size])],
             LayerShape::Linear { inputs, outputs } => {
                 vec![("weight", vec![inputs, outputs]), ("bias", vec![outputs])]
@@ -236,6 +254,39 @@ impl Weights<'_> {
     pub fn attention(&mut self, name: &str, size: usize, heads: usize) -> Result<Attention, ModelError> {
         let mut part = |part: &str| self.linear(&format!("{name}.{part}"), size, size);
         Ok(Attention::new(heads, part("query")?, part("key")?, part("value")?, part("output")?))
+    }
+
+    /// Takes an attention layer of a stream, whose heads cut its size into pieces of an even width.
+    ///
+    /// # Errors
+    /// When one of its tensors is missing or has another shape.
+    pub fn rotary_attention(
+        &mut self,
+        name: &str,
+        size: usize,
+        heads: usize,
+    ) -> Result<RotaryAttention, ModelError> {
+        let mut part = |part: &str| self.linear(&format!("{name}.{part}"), size, size);
+        Ok(RotaryAttention::new(heads, part("query")?, part("key")?, part("value")?, part("output")?))
+    }
+
+    /// Takes a gated feed-forward part.
+    ///
+    /// # Errors
+    /// When one of its tensors is missing or has another shape.
+    pub fn swi_glu(&mut self, name: &str, size: usize, hidden: usize) -> Result<SwiGlu, ModelError> {
+        let gate = self.linear(&format!("{name}.gate"), size, hidden)?;
+        let value = self.linear(&format!("{name}.value"), size, hidden)?;
+        Ok(SwiGlu::new(gate, value, self.linear(&format!("{name}.output"), hidden, size)?))
+    }
+
+    /// Takes a normalisation by the root mean square.
+    ///
+    /// # Errors
+    /// When its tensor is missing or has another shape.
+    pub fn rms_norm(&mut self, name: &str, size: usize) -> Result<RmsNorm, ModelError> {
+        let parts = self.layer(name, LayerShape::RmsNorm { size })?;
+        Ok(RmsNorm::new(parts[0]))
     }
 
     /// Takes a layer normalisation.

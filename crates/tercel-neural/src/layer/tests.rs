@@ -224,3 +224,76 @@ fn positions_tell_the_steps_of_a_window_apart() {
         assert!(apart > 0.1, "{a} {b}");
     }
 }
+
+#[test]
+fn attention_with_a_cache_is_the_definition_over_the_last_steps_however_many_came_before() {
+    let (steps, size, heads, window) = (23, 12, 3, 5);
+    let weights: Vec<_> = (0..4).map(|i| values(size * size, 20 + i, 0.6)).collect();
+    let biases: Vec<_> = (0..4).map(|i| values(size, 30 + i, 0.3)).collect();
+    let linear = |i: usize| Linear::new(size, size, &weights[i], &biases[i]);
+    let layer = super::RotaryAttention::new(heads, linear(0), linear(1), linear(2), linear(3));
+    let x = values(steps * size, 1, 2.0);
+    let mut past = super::KeyValues::new(size, window);
+    let mut scratch = vec![f32::NAN; layer.scratch(window)];
+    let project = |x: &[f32], i: usize| product(&doubled(x), &weights[i], &biases[i]);
+    for step in 0..steps {
+        let mut y = vec![0.0; size];
+        layer.step(&x[step * size..][..size], &mut past, &mut y, &mut scratch);
+        assert_eq!(past.len(), window.min(step + 1));
+        let row = |step: usize| &x[step * size..][..size];
+        let query = project(row(step), 0);
+        let mut mixed = vec![0.0_f32; size];
+        let seen: Vec<usize> = ((step + 1).saturating_sub(window)..=step).collect();
+        for head in 0..heads {
+            let share = |before: &usize| {
+                let key = project(row(*before), 1);
+                // Turning both by their steps is turning one by the steps between them.
+                let pairs = (0..2).map(|pair| {
+                    let angle = (step - before) as f64 / 10_000_f64.powf(pair as f64 / 2.0);
+                    let c = 4 * head + 2 * pair;
+                    let (q, k) = ([query[c], query[c + 1]], [key[c], key[c + 1]]);
+                    angle.cos() * (q[0] * k[0] + q[1] * k[1]) - angle.sin() * (q[1] * k[0] - q[0] * k[1])
+                });
+                (pairs.sum::<f64>() / 2.0).exp()
+            };
+            let shares: Vec<f64> = seen.iter().map(share).collect();
+            let sum: f64 = shares.iter().sum();
+            for (c, mixed) in mixed.iter_mut().enumerate().skip(4 * head).take(4) {
+                let values = seen.iter().map(|before| project(row(*before), 2)[c]);
+                *mixed = values.zip(&shares).map(|(v, s)| v * s / sum).sum::<f64>() as f32;
+            }
+        }
+        close(&y, &project(&mixed, 3), 1e-5);
+    }
+}
+
+#[test]
+fn caches_of_one_step_merge_to_their_mean_and_others_to_the_heavier() {
+    let zero = || Linear::new(2, 2, &[0.0; 4], &[0.0; 2]);
+    let same = || Linear::new(2, 2, &[1.0, 0.0, 0.0, 1.0], &[0.0; 2]);
+    let layer = super::RotaryAttention::new(1, zero(), same(), same(), same());
+    let mut scratch = vec![0.0; layer.scratch(3)];
+    let mut cache = |rows: &[f32]| {
+        let mut past = super::KeyValues::new(2, 3);
+        rows.iter().for_each(|x| layer.step(&[*x, *x], &mut past, &mut [0.0; 2], &mut scratch));
+        past
+    };
+    let (one, other, older) = (cache(&[1.0, 2.0]), cache(&[3.0, 6.0]), cache(&[1.0, 2.0, 5.0]));
+    let mut merged = one.clone();
+    merged.merge(0.75, &other, 0.25);
+    let mean = cache(&[1.5, 3.0]);
+    assert_eq!(merged.len(), 2);
+    let [found, expected] = [merged, mean].map(|mut past| {
+        let mut y = [0.0; 2];
+        layer.step(&[0.0; 2], &mut past, &mut y, &mut vec![0.0; layer.scratch(3)]);
+        y
+    });
+    assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?} {expected:?}");
+    let mut merged = one.clone();
+    merged.merge(0.4, &older, 0.6);
+    assert_eq!(merged, older);
+    merged.merge(0.6, &one, 0.4);
+    assert_eq!(merged, older);
+    merged.clear();
+    assert!(merged.is_empty() && merged == super::KeyValues::new(2, 3));
+}

@@ -10,12 +10,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tercel_core::motion::{Motion, Turn};
 use tercel_core::sensor::{ConvertedPolar, Measurement};
+use tercel_neural::filter::extent_net::{self, Frame};
 use tercel_neural::filter::rmm_net::{self, Aligned, Identification};
 use tercel_neural::filter::{
     Architecture, Attention, BankNetwork, BranchHyper, Covariance, DeepMttHyper, EnsKNetsHyper,
-    EnsembleNetwork, Feature, Form, GainNetwork, KalmanNetHyper, LiquidHyper, LiquidNetwork, MnemonicHyper,
-    MnemonicNetwork, NeuralImmHyper, Normalisation, Residual, ResidualNetwork, RmmNetHyper, RmmNetwork, Sign,
-    TrMttHyper, TransformerNetwork,
+    EnsembleNetwork, ExtentNetHyper, ExtentNetwork, Feature, Form, GainNetwork, KalmanNetHyper, LiquidHyper,
+    LiquidNetwork, MnemonicHyper, MnemonicNetwork, NeuralImmHyper, Normalisation, Residual, ResidualNetwork,
+    RmmNetHyper, RmmNetwork, Sign, TrMttHyper, TransformerNetwork,
 };
 use tercel_neural::layer::{CellShape, Solver};
 use tercel_neural::{Card, Model, Tensor};
@@ -226,4 +227,22 @@ pub fn small_rmm_net() -> RmmNetHyper {
     let identification = Identification { order: 3, ..Identification::default() };
     let form = Aligned { hidden: 7, encoder: 6, speed: 20.0, identification, ..Aligned::default() };
     RmmNetHyper { interval: 1.0, memory: 8, form: rmm_net::Form::Aligned(form) }
+}
+
+/// An ExtentNet with random weights.
+pub fn extent_net(hyper: &ExtentNetHyper, size: f32) -> Arc<ExtentNetwork> {
+    let model = model("extent-net", hyper.to_table().unwrap(), hyper.tensors(), size);
+    Arc::new(ExtentNetwork::from_model(&model).unwrap())
+}
+
+/// Small ones for the objects of the conformance suite, with either memory.
+pub fn small_extent_nets(frame: Frame) -> [ExtentNetHyper; 2] {
+    let architectures = [
+        extent_net::Architecture::Lstm { units: 8 },
+        extent_net::Architecture::Transformer { size: 12, heads: 3, layers: 2, feed: 10, window: 7 },
+    ];
+    let position = if frame == Frame::Absolute { 5000.0 } else { 20.0 };
+    let units =
+        ExtentNetHyper { frame, position, velocity: 20.0, change: 12.0, speed: 20.0, ..Default::default() };
+    architectures.map(|architecture| ExtentNetHyper { architecture, ..units.clone() })
 }

@@ -22,6 +22,9 @@ mod layer_norm;
 mod linear;
 mod lstm;
 mod ltc;
+mod rms_norm;
+mod rotary_attention;
+mod swi_glu;
 mod synapses;
 #[cfg(test)]
 mod tests;
@@ -36,6 +39,9 @@ pub use layer_norm::LayerNorm;
 pub use linear::{Activation, Linear};
 pub use lstm::{Lstm, LstmState};
 pub use ltc::Ltc;
+pub use rms_norm::RmsNorm;
+pub use rotary_attention::{KeyValues, RotaryAttention};
+pub use swi_glu::{SwiGlu, silu};
 
 use crate::TrainError;
 

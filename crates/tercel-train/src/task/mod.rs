@@ -2,6 +2,7 @@
 
 pub mod deep_mtt;
 pub mod ens_knets;
+pub mod extent_net;
 pub mod flights;
 mod gaussians;
 pub mod kalman_net;
@@ -23,9 +24,10 @@ use crate::recipe;
 use crate::trainer::{Progress, Run, Summary};
 
 /// The kinds of recipes.
-pub const KINDS: [&str; 8] = [
+pub const KINDS: [&str; 9] = [
     <deep_mtt::DeepMttKind as recipe::Kind>::NAME,
     <ens_knets::EnsKNetsKind as recipe::Kind>::NAME,
+    <extent_net::ExtentNetKind as recipe::Kind>::NAME,
     <kalman_net::KalmanNetKind as recipe::Kind>::NAME,
     <liquid::LiquidKind as recipe::Kind>::NAME,
     <mnemonic::MnemonicKind as recipe::Kind>::NAME,
@@ -47,6 +49,7 @@ pub fn train(
     match recipe::kind(recipe)?.as_str() {
         "deep-mtt" => deep_mtt::train(recipe, run, observer),
         "ens-knets" => ens_knets::train(recipe, run, observer),
+        "extent-net" => extent_net::train(recipe, run, observer),
         "kalman-net" => kalman_net::train(recipe, run, observer),
         "liquid" => liquid::train(recipe, run, observer),
         "mnemonic" => mnemonic::train(recipe, run, observer),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tercel_neural::{Model, shipped};
 
+use crate::trainer::Tracks;
 use crate::{ParameterSet, TrainError};
 
 /// The recipes of a kind.
@@ -54,4 +55,21 @@ pub fn fill(set: &mut ParameterSet, model: &Model) {
     for (name, values) in set.values_mut() {
         values.copy_from_slice(&model.tensors()[name].values);
     }
+}
+
+/// Aircraft that turn, with a speed that is never quite the same, every four seconds.
+pub fn turning_flights(steps: usize) -> Tracks {
+    let flight = |number: usize| {
+        let mut place = nalgebra::Vector2::zeros();
+        let state = |step: usize| {
+            let (k, phase) = (step as f64, 0.7 * number as f64);
+            let (course, speed) =
+                (0.08 * k + (0.05 * k + phase).sin(), 100.0 + 12.0 * (2.1 * k + phase).sin());
+            let velocity = nalgebra::Vector2::new(course.cos(), course.sin()) * speed;
+            place += velocity * 4.0;
+            nalgebra::Vector4::new(place.x, place.y, velocity.x, velocity.y)
+        };
+        (0..steps).map(state).collect()
+    };
+    Tracks::new((0..10).map(flight).collect())
 }

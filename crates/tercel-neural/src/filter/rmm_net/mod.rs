@@ -33,6 +33,7 @@ pub use features::{Before, EXTENT_SEEN, heading};
 pub use hyper::{Aligned, Form, RmmNetHyper, Sizes};
 pub use kinematics::{Kinematics, begin};
 pub use network::RmmNetwork;
+pub(in crate::filter) use number::within;
 pub use number::{Number, Symmetric};
 pub use published::{Blocks, Extended, Moments, Published, Transition};
 /// Widths of what the form of the publication sees and says.

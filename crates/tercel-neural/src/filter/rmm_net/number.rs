@@ -77,7 +77,7 @@ impl Number for f64 {
 
 /// `x` near zero, and within `±limit` everywhere.
 #[inline]
-pub(super) fn within<T: Number>(x: T, limit: f64) -> T {
+pub(in crate::filter) fn within<T: Number>(x: T, limit: f64) -> T {
     (x * (1.0 / limit)).tanh() * limit
 }
 

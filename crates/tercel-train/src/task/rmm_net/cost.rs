@@ -143,7 +143,7 @@ pub fn distance<T: Number>(extent: &Symmetric<T>, truth: &Symmetric<f64>) -> T {
 }
 
 /// Minus the logarithm of the density of the truth under an inverse Wishart belief, with the mean as given.
-fn score<'t>(
+pub fn score<'t>(
     mean: &Symmetric<Variable<'t>>,
     ln_weight: Variable<'t>,
     truth: &Symmetric<f64>,

@@ -68,6 +68,9 @@ pub enum Source {
         /// Learns from simulated tracks instead, each of which moves as a recorded one with so many past velocities.
         #[serde(default)]
         imitated: Option<usize>,
+        /// Takes the tracks where they are, neither moved to the origin nor turned: for what knows its way by heart.
+        #[serde(default)]
+        fixed: bool,
     },
 }
 
@@ -131,7 +134,7 @@ impl RmmNetData {
                 }
                 Ok(())
             }
-            Source::Tracks { axes, folds, fold, imitated } => {
+            Source::Tracks { axes, folds, fold, imitated, .. } => {
                 size("data.source.imitated", imitated.unwrap_or(1), [1, 64])?;
                 positive("data.source.axes[0]", axes[0])?;
                 positive("data.source.axes[1]", axes[1])?;
@@ -195,7 +198,7 @@ impl RmmNetData {
                 let sizes = if own { Sizes::MIXED } else { Sizes::PUBLISHED };
                 Ok(vehicle.with_sizes(sizes).map_err(failed)?.ride(seed, number))
             }
-            Source::Tracks { axes, folds, fold, imitated } => {
+            Source::Tracks { axes, folds, fold, imitated, fixed } => {
                 let here = |(number, _): &(usize, &Vec<Vector4<f64>>)| {
                     (number % folds == *fold) == (draw.split == Split::Validation)
                 };
@@ -203,25 +206,33 @@ impl RmmNetData {
                 let Some(track) = own.get(sample as usize % own.len().max(1)) else {
                     return Err(TrainError::Data("there are fewer tracks than folds".to_owned()));
                 };
-                let states = match imitated {
-                    Some(order) => {
-                        self.cut(&imitation(track, *order, self.interval, random)?, draw.split, random)
-                    }
-                    None => self.cut(track, draw.split, random),
+                let own = match imitated {
+                    Some(order) => &imitation(track, *order, self.interval, random)?,
+                    None => *track,
                 };
+                let states = self.cut(own, (draw.split, *fixed), random);
                 let angles = Heading::Course.angles(&states, draw.seed, sample);
                 Ride::new(self.interval, states, angles, Vector2::from(*axes)).map_err(failed)
             }
         }
     }
 
-    /// A part of a track; in training from any of its steps, turned and perhaps reflected.
-    fn cut(&self, track: &[Vector4<f64>], split: Split, random: &mut ChaCha8Rng) -> Vec<Vector4<f64>> {
+    /// A part of a track; in training from any of its steps. Unless it is fixed it begins at the origin, and in training it is
+    /// turned and perhaps reflected.
+    fn cut(
+        &self,
+        track: &[Vector4<f64>],
+        (split, fixed): (Split, bool),
+        random: &mut ChaCha8Rng,
+    ) -> Vec<Vector4<f64>> {
         let spare = track.len().saturating_sub(self.steps);
         let first = if split == Split::Training { random.random_range(0..=spare) } else { 0 };
         let turn = Rotation2::new(random.random_range(0.0..std::f64::consts::TAU));
         let mirror = if random.random::<bool>() { -1.0 } else { 1.0 };
         let part = &track[first..(first + self.steps).min(track.len())];
+        if fixed {
+            return part.to_vec();
+        }
         let origin = part.first().map_or(Vector2::zeros(), |state| state.xy());
         let changed = |state: &Vector4<f64>| {
             let [place, velocity] = [state.xy() - origin, Vector2::new(state.z, state.w)];

@@ -32,12 +32,14 @@ use std::sync::Arc;
 use tercel_neural::filter::rmm_net::{Form, Length, RmmNetHyper};
 use tercel_neural::{Card, Model, Scale};
 
+pub(super) use cost::{Truth, distance, score};
+pub(super) use data::Rides;
+pub(super) use operations::Rows;
+
 pub use cost::Costs;
 pub use data::{Population, RmmNetData, Source};
 
 use aligned::{AlignedNet, Known};
-use cost::{Truth, distance};
-use data::Rides;
 use operations::Judge;
 use published::PublishedNet;
 use rows::Layout;

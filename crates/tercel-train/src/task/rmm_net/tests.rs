@@ -95,28 +95,10 @@ fn the_shipped_models_do_what_was_trained() {
         if !matches!(recipe.data.source, Source::Crossings) {
             recipe.data.steps = 1001;
         }
-        let (task, mut set) = RmmNetTask::new(&recipe, Some(flights(1001))).unwrap();
+        let (task, mut set) = RmmNetTask::new(&recipe, Some(repository::turning_flights(1001))).unwrap();
         repository::fill(&mut set, &model);
         agree(&task, &set, recipe.data.steps - 1);
     }
-}
-
-/// Aircraft that turn, with a speed that is never quite the
-/// same, every four seconds.
-fn flights(steps: usize) -> Tracks {
-    let flight = |number: usize| {
-        let mut place = nalgebra::Vector2::zeros();
-        let state = |step: usize| {
-            let (k, phase) = (step as f64, 0.7 * number as f64);
-            let (course, speed) =
-                (0.08 * k + (0.05 * k + phase).sin(), 100.0 + 12.0 * (2.1 * k + phase).sin());
-            let velocity = nalgebra::Vector2::new(course.cos(), course.sin()) * speed;
-            place += velocity * 4.0;
-            Vector4::new(place.x, place.y, velocity.x, velocity.y)
-        };
-        (0..steps).map(state).collect()
-    };
-    Tracks::new((0..10).map(flight).collect())
 }
 
 /// Compares the differentiable model and the filter over some steps of three objects.
