@@ -25,6 +25,9 @@ pub struct PublishedNet {
     update: Option<Head>,
 }
 
+/// The moments of a scan, if it has points, and by how much the origin moves.
+type Seen = (Option<Moments>, [f64; 2]);
+
 /// Square factors start with this on their diagonal: their products are small then, and have slopes.
 const FIRST: f32 = 0.1;
 
@@ -122,7 +125,7 @@ impl PublishedNet {
         (before, origins): (&[Extended<f64>], &[[f64; 2]]),
         said: &[Vec<f64>],
         scans: &[Points],
-    ) -> (Vec<(Option<Moments>, [f64; 2])>, Vec<f32>) {
+    ) -> (Vec<Seen>, Vec<f32>) {
         let (scale, noise) = (self.scattering.scale(), self.scattering.noise());
         let mut rows = vec![0.0; scans.len() * widths::SCAN_SEEN];
         let mut moments = Vec::with_capacity(scans.len());
