@@ -32,7 +32,7 @@ struct Block {
 /// What the network remembers of a batch.
 #[derive(Debug, Clone)]
 pub enum Past {
-    Lstm(LstmState),
+    Lstm(Box<LstmState>),
     Transformer(Vec<KeyValues>),
 }
 
@@ -72,7 +72,7 @@ impl Network {
     /// The memory of a batch of which nothing was seen.
     pub fn past(&self, members: usize) -> Past {
         match &self.body {
-            Body::Lstm(layer) => Past::Lstm(LstmState::zero(members, layer.size())),
+            Body::Lstm(layer) => Past::Lstm(Box::new(LstmState::zero(members, layer.size()))),
             Body::Transformer { blocks, .. } => Past::Transformer(vec![KeyValues::default(); blocks.len()]),
         }
     }
@@ -83,7 +83,7 @@ impl Network {
             (Past::Transformer(caches), Body::Transformer { window, .. }) => {
                 Past::Transformer(caches.into_iter().map(|cache| cache.detached(*window, next)).collect())
             }
-            (Past::Lstm(state), _) => Past::Lstm(state.detached()),
+            (Past::Lstm(state), _) => Past::Lstm(Box::new(state.detached())),
             (past, _) => past,
         }
     }
@@ -112,8 +112,8 @@ impl Network {
                 (norm.forward(weights, x), Past::Transformer(next))
             }
             (Body::Lstm(layer), Past::Lstm(before)) => {
-                let after = kept(layer.step(weights, seen, before.clone()), before, scans);
-                (after.hidden.clone(), Past::Lstm(after))
+                let after = kept(layer.step(weights, seen, (*before).clone()), *before, scans);
+                (after.hidden.clone(), Past::Lstm(Box::new(after)))
             }
             // A network makes its own memory.
             (_, past) => (seen, past),

@@ -121,9 +121,9 @@ fn agree(task: &ExtentNetTask, set: &ParameterSet, steps: usize) {
             let row: Vec<f64> = found[member * JUDGED..][..JUDGED].iter().map(|x| f64::from(*x)).collect();
             let mut ran = filter.state(belief);
             (0..2).for_each(|i| ran.mean[i] -= state.known[member].origin[i]);
-            for i in 0..4 {
+            for (i, trained) in row.iter().enumerate().take(4) {
                 let scale = ran.mean.fixed_rows::<2>(i / 2 * 2).norm().max(10.0);
-                let error = (row[i] - ran.mean[i]).abs();
+                let error = (trained - ran.mean[i]).abs();
                 assert!(error < 1e-4 * scale, "step {step}, member {member}, {i}: {error}");
             }
             let (told, extent) = (Told::of(&row).extent(), filter.extent(belief).unwrap());
