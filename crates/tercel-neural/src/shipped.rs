@@ -43,6 +43,10 @@ const FILES: &[(&str, &[u8])] = files![
     "liquid-gru",
     "liquid-mlp",
     "liquid-paper",
+    "lstm-aircraft",
+    "lstm-aircraft-paper",
+    "lstm-vehicle",
+    "lstm-vehicle-paper",
     "mnemonic",
     "neural-imm",
     "neural-imm-liquid",
@@ -63,6 +67,10 @@ const FILES: &[(&str, &[u8])] = files![
     "rmmnet-vehicle",
     "rmmnet-vehicle-paper",
     "tr-mtt",
+    "transformer-aircraft",
+    "transformer-aircraft-paper",
+    "transformer-vehicle",
+    "transformer-vehicle-paper",
 ];
 
 /// The model of this name.

@@ -45,6 +45,14 @@ pub(crate) struct Settings {
     pub rmmnet: &'static str,
     /// The model of its form in the publication.
     pub rmmnet_paper: &'static str,
+    /// The models of networks alone, relative to the centroid.
+    pub lstm: &'static str,
+    /// The same of the transformer.
+    pub transformer: &'static str,
+    /// The models of networks alone as published.
+    pub lstm_paper: &'static str,
+    /// The same of the transformer.
+    pub transformer_paper: &'static str,
     /// What the publication says.
     pub paper: PaperSettings,
 }
@@ -149,6 +157,10 @@ impl Settings {
         weights: 0.25,
         rmmnet: "rmmnet-vehicle",
         rmmnet_paper: "rmmnet-vehicle-paper",
+        lstm: "lstm-vehicle",
+        transformer: "transformer-vehicle",
+        lstm_paper: "lstm-vehicle-paper",
+        transformer_paper: "transformer-vehicle-paper",
         paper: VEHICLE_PAPER,
     };
 
@@ -202,6 +214,10 @@ impl Settings {
         weights: 0.05,
         rmmnet: "rmmnet-aircraft",
         rmmnet_paper: "rmmnet-aircraft-paper",
+        lstm: "lstm-aircraft",
+        transformer: "transformer-aircraft",
+        lstm_paper: "lstm-aircraft-paper",
+        transformer_paper: "transformer-aircraft-paper",
         paper: AIRCRAFT_PAPER,
     };
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tercel_core::error::FilterError;
-use tercel_neural::filter::{RmmNet, RmmNetwork};
+use tercel_neural::filter::{ExtentNet, ExtentNetwork, RmmNet, RmmNetwork};
 use tercel_neural::shipped::Models;
 
 use super::matrix::sensor;
@@ -24,5 +24,21 @@ impl Remembering {
 impl Method for Remembering {
     fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
         follow::<4, _>(recording, &RmmNet::new(Arc::clone(&self.0), sensor(recording)?))
+    }
+}
+
+/// A network without a model of motion or sensor.
+pub(super) struct Alone(Arc<ExtentNetwork>);
+
+impl Alone {
+    /// With the model of this name.
+    pub fn new(models: &Models, model: &str) -> Result<Self, StudyError> {
+        Ok(Alone(Arc::new(ExtentNetwork::from_model(&models.get(model)?)?)))
+    }
+}
+
+impl Method for Alone {
+    fn follow(&self, recording: &Recording) -> Result<Vec<StepEstimate>, FilterError> {
+        follow::<4, _>(recording, &ExtentNet::new(Arc::clone(&self.0), sensor(recording)?))
     }
 }

@@ -10,6 +10,8 @@
 //! | `imm-rmm`, `imm-rmm-paper` | | the same in four interacting modes: straight, accelerating, turning left and right |
 //! | `mem-ekf`, `mem-ekf-paper` | | multiplicative error, linearised (Yang and Baum) |
 //! | `mem-rbpf`, `mem-rbpf-paper` | | multiplicative error with particles of the angle (Steuernagel and Baum) |
+//! | `lstm-paper`, `transformer-paper` | | networks alone as published: absolute positions in and out |
+//! | `lstm`, `transformer` | | the same, relative to the centroid and its way |
 //! | `rmmnet-paper` | | RMMNet as published |
 //! | `rmmnet` | | random matrix with a learned memory, which also sees the points themselves |
 //! | `rmmnet-imitation-1`, `-3`, `-5`, `-10` | | the same, trained on tracks that were simulated from so many weights of recorded ones |
@@ -33,7 +35,7 @@ use super::{Method, Recording, StepEstimate};
 use crate::error::StudyError;
 
 /// Names of all methods of the study `vehicle`, in the order in which they are best read.
-pub const VEHICLE_METHODS: [&str; 20] = [
+pub const VEHICLE_METHODS: [&str; 24] = [
     "centroid",
     "b-rmm-paper",
     "vb-rmm-paper",
@@ -41,6 +43,8 @@ pub const VEHICLE_METHODS: [&str; 20] = [
     "imm-rmm-paper",
     "mem-ekf-paper",
     "mem-rbpf-paper",
+    "lstm-paper",
+    "transformer-paper",
     "rmmnet-paper",
     "b-rmm",
     "ffk-rmm",
@@ -49,6 +53,8 @@ pub const VEHICLE_METHODS: [&str; 20] = [
     "imm-rmm",
     "mem-ekf",
     "mem-rbpf",
+    "lstm",
+    "transformer",
     "rmmnet",
     "known-size",
     "aligned",
@@ -57,7 +63,7 @@ pub const VEHICLE_METHODS: [&str; 20] = [
 ];
 
 /// Names of all methods of the study `aircraft`: nobody knows the true motion there.
-pub const AIRCRAFT_METHODS: [&str; 23] = [
+pub const AIRCRAFT_METHODS: [&str; 27] = [
     "centroid",
     "b-rmm-paper",
     "vb-rmm-paper",
@@ -65,6 +71,8 @@ pub const AIRCRAFT_METHODS: [&str; 23] = [
     "imm-rmm-paper",
     "mem-ekf-paper",
     "mem-rbpf-paper",
+    "lstm-paper",
+    "transformer-paper",
     "rmmnet-paper",
     "b-rmm",
     "ffk-rmm",
@@ -73,6 +81,8 @@ pub const AIRCRAFT_METHODS: [&str; 23] = [
     "imm-rmm",
     "mem-ekf",
     "mem-rbpf",
+    "lstm",
+    "transformer",
     "rmmnet",
     "rmmnet-imitation-1",
     "rmmnet-imitation-3",
@@ -113,6 +123,10 @@ pub(crate) fn method(
         "mem-ekf-paper" => Box::new(shape::Linearised { settings, paper: true }),
         "mem-rbpf" => Box::new(shape::Sampled { settings, paper: false }),
         "mem-rbpf-paper" => Box::new(shape::Sampled { settings, paper: true }),
+        "lstm-paper" => Box::new(learned::Alone::new(models, settings.lstm_paper)?),
+        "lstm" => Box::new(learned::Alone::new(models, settings.lstm)?),
+        "transformer-paper" => Box::new(learned::Alone::new(models, settings.transformer_paper)?),
+        "transformer" => Box::new(learned::Alone::new(models, settings.transformer)?),
         "rmmnet-paper" => Box::new(learned::Remembering::new(models, settings.rmmnet_paper)?),
         name if ABLATION.contains(&name) => {
             Box::new(learned::Remembering::new(models, &format!("rmmnet-ablation-{name}"))?)
