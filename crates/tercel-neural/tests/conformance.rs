@@ -1,5 +1,6 @@
 //! Learned filters keep the promises of every filter.
 
+// The suite of core has helpers that only the filters of core use.
 #[path = "../../tercel-core/tests/conformance/extended.rs"]
 #[allow(dead_code, clippy::unwrap_used)]
 mod extended;

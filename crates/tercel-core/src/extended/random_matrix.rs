@@ -245,6 +245,10 @@ impl<T> RandomMatrix<T> {
         let mut after = belief.extent;
         after.add(&squares, count);
         let ln_likelihood = likelihood::ln_points(&belief.extent, &spread, &squares, points, &belief.state);
+        // Where a belief is as wide as numbers go, infinities cancel.
+        if ln_likelihood.is_nan() {
+            return Err(FilterError::NotFinite { what: "likelihood of the points" });
+        }
         let residual = Vector2::from_column_slice(comparison.innovation.residual());
         let innovation = Innovation::new(&residual, comparison.innovation.nis, ln_likelihood);
         let mut state = belief.state;

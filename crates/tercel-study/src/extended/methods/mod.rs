@@ -62,36 +62,22 @@ pub const VEHICLE_METHODS: [&str; 24] = [
     "oracle",
 ];
 
-/// Names of all methods of the study `aircraft`: nobody knows the true motion there.
-pub const AIRCRAFT_METHODS: [&str; 27] = [
-    "centroid",
-    "b-rmm-paper",
-    "vb-rmm-paper",
-    "lan-li-paper",
-    "imm-rmm-paper",
-    "mem-ekf-paper",
-    "mem-rbpf-paper",
-    "lstm-paper",
-    "transformer-paper",
-    "rmmnet-paper",
-    "b-rmm",
-    "ffk-rmm",
-    "vb-rmm",
-    "lan-li",
-    "imm-rmm",
-    "mem-ekf",
-    "mem-rbpf",
-    "lstm",
-    "transformer",
-    "rmmnet",
-    "rmmnet-imitation-1",
-    "rmmnet-imitation-3",
-    "rmmnet-imitation-5",
-    "rmmnet-imitation-10",
-    "known-size",
-    "aligned",
-    "aligned-ar",
-];
+/// Networks that learned from imitations of recorded tracks: models and methods have the same names.
+const IMITATIONS: [&str; 4] =
+    ["rmmnet-imitation-1", "rmmnet-imitation-3", "rmmnet-imitation-5", "rmmnet-imitation-10"];
+
+/// Names of all methods of the study `aircraft`: those of vehicles but the last, since nobody knows the true motion there, and the
+/// imitations.
+pub const AIRCRAFT_METHODS: [&str; 27] = {
+    let shared = VEHICLE_METHODS.len() - 1;
+    let mut all = [""; 27];
+    let mut place = 0;
+    while place < all.len() {
+        all[place] = if place < shared { VEHICLE_METHODS[place] } else { IMITATIONS[place - shared] };
+        place += 1;
+    }
+    all
+};
 
 /// Names of all methods of the study `vehicle-ablation`: RMMNet as published, small, and without some of its blocks.
 pub const ABLATION: [&str; 6] =
@@ -132,9 +118,7 @@ pub(crate) fn method(
             Box::new(learned::Remembering::new(models, &format!("rmmnet-ablation-{name}"))?)
         }
         "rmmnet" => Box::new(learned::Remembering::new(models, settings.rmmnet)?),
-        name if name.starts_with("rmmnet-imitation-") && AIRCRAFT_METHODS.contains(&name) => {
-            Box::new(learned::Remembering::new(models, name)?)
-        }
+        name if IMITATIONS.contains(&name) => Box::new(learned::Remembering::new(models, name)?),
         "known-size" => Box::new(known::Sized(settings)),
         "aligned" => Box::new(known::Straight(settings)),
         "aligned-ar" => Box::new(known::Regressive(settings)),

@@ -33,9 +33,8 @@ use cost::Judge;
 use network::{Network, Past};
 use operations::{Given, See, Tell};
 
-use super::rmm_net::{Rides, RmmNetData, Source, Truth, distance};
+use super::rmm_net::{Rides, RmmNetData, Truth, distance};
 use crate::backend::{Tensor, apply, constant, detached, values};
-use crate::check::refused;
 use crate::recipe::{Kind, Recipe};
 use crate::trainer::{self, Draw, Loss, Progress, Run, Split, Summary, Task, Tracks};
 use crate::{ParameterSet, TrainError, Weights};
@@ -106,19 +105,7 @@ impl ExtentNetTask {
         hyper.check().map_err(|reason| TrainError::Recipe(format!("[model]: {reason}")))?;
         costs.check()?;
         data.check()?;
-        if hyper.interval != data.interval {
-            let expected = format!("the trajectories have a step of {} s", data.interval);
-            return Err(refused("model.interval", hyper.interval, expected));
-        }
-        let tracks = match (&data.source, tracks) {
-            (Source::Tracks { .. }, None) => {
-                return Err(TrainError::Data(
-                    "this recipe learns from recorded tracks; name them with --data".to_owned(),
-                ));
-            }
-            (Source::Tracks { .. }, Some(tracks)) => tracks,
-            (Source::Vehicles { .. } | Source::Crossings, _) => Tracks::default(),
-        };
+        let tracks = data.fit(hyper.interval, tracks)?;
         let window = if costs.window == 0 { data.steps } else { costs.window };
         let mut set = ParameterSet::new(recipe.seed);
         let network = Network::new(&mut set, &hyper.architecture)?;

@@ -144,6 +144,25 @@ impl RmmNetData {
         }
     }
 
+    /// The recorded tracks to learn from, of those that were given: none where the objects are simulated.
+    ///
+    /// # Errors
+    ///
+    /// When the network is made for another interval, or there are no tracks to learn from.
+    pub fn fit(&self, interval: f64, tracks: Option<Tracks>) -> Result<Tracks, TrainError> {
+        if interval != self.interval {
+            let expected = format!("the trajectories have a step of {} s", self.interval);
+            return Err(refused("model.interval", interval, expected));
+        }
+        match (&self.source, tracks) {
+            (Source::Tracks { .. }, Some(tracks)) => Ok(tracks),
+            (Source::Tracks { .. }, None) => Err(TrainError::Data(
+                "this recipe learns from recorded tracks; name them with --data".to_owned(),
+            )),
+            (Source::Vehicles { .. } | Source::Crossings, _) => Ok(Tracks::default()),
+        }
+    }
+
     fn scatterers(&self) -> Result<Scatterers, TrainError> {
         let failed = |error: tercel_sim::SimulationError| TrainError::Data(error.to_string());
         let scatterers = Scatterers::new(self.points, self.covariance()).map_err(failed)?;

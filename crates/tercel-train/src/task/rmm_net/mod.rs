@@ -45,7 +45,6 @@ use published::PublishedNet;
 use rows::Layout;
 
 use crate::backend::{Tensor, apply, detached, values};
-use crate::check::refused;
 use crate::layer::LstmState;
 use crate::recipe::{Kind, Recipe};
 use crate::trainer::{self, Draw, Loss, Progress, Run, Split, Summary, Task, Tracks};
@@ -105,19 +104,7 @@ impl RmmNetTask {
         hyper.check().map_err(|reason| TrainError::Recipe(format!("[model]: {reason}")))?;
         costs.check()?;
         data.check()?;
-        if hyper.interval != data.interval {
-            let expected = format!("the trajectories have a step of {} s", data.interval);
-            return Err(refused("model.interval", hyper.interval, expected));
-        }
-        let tracks = match (&data.source, tracks) {
-            (Source::Tracks { .. }, None) => {
-                return Err(TrainError::Data(
-                    "this recipe learns from recorded tracks; name them with --data".to_owned(),
-                ));
-            }
-            (Source::Tracks { .. }, Some(tracks)) => tracks,
-            (Source::Vehicles { .. } | Source::Crossings, _) => Tracks::default(),
-        };
+        let tracks = data.fit(hyper.interval, tracks)?;
         let window = if costs.window == 0 { data.steps } else { costs.window };
         let mut set = ParameterSet::new(recipe.seed);
         let length = Length { dt: data.interval, share: data.interval / hyper.interval };
