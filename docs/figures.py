@@ -80,18 +80,33 @@ def command_of(study):
     return command
 
 
-def sweep(study):
+# The metrics that are shown over what a sweep changes, by one that tells the kind of study: heading and digits.
+SWEPT = {
+    "rmse_all": [("rmse_all", "rmse_all", 1)],
+    "gwd": [("rmse_pos", "rmse_pos, m", 3), ("iou", "iou", 3), ("gwd", "gwd, m²", 3)],
+}
+
+
+def swept(study, metric, heading, digits):
     values, rows = [], {}
     for row in study["rows"]:
         (value,) = row["at"].values()
         if value not in values:
             values.append(value)
-        rows.setdefault(row["method"], {})[value] = cell(row["metrics"].get("rmse_all"), 1)
-    lines = ["| method | " + " | ".join(f"{value:g}" for value in values) + " |", "|---" * (len(values) + 1) + "|"]
+        rows.setdefault(row["method"], {})[value] = cell(row["metrics"].get(metric), digits)
+    lines = [f"| {heading} | " + " | ".join(f"{value:g}" for value in values) + " |", "|---" * (len(values) + 1) + "|"]
     for method, cells in rows.items():
         if any(cell != "–" for cell in cells.values()):
             lines.append(f"| `{method}` | " + " | ".join(cells.get(value, "–") for value in values) + " |")
     return lines
+
+
+def sweep(study):
+    known = {name for row in study["rows"] for name, figure in row["metrics"].items() if figure}
+    metrics = next(metrics for metric, metrics in SWEPT.items() if metric in known)
+    if len(metrics) == 1:
+        return swept(study, metrics[0][0], "method", metrics[0][2])
+    return "\n\n".join("\n".join(swept(study, *metric)) for metric in metrics).split("\n")
 
 
 def main(results):

@@ -27,8 +27,17 @@ struct Scene {
 }
 
 fn scene(objects: usize, clutter: usize, scans: usize) -> Scene {
+    scene_of(200.0, objects, clutter, scans)
+}
+
+/// The density of the study `clutter-partial`: a square of 866 m for each of ten objects, 40 false detections in all.
+fn wide_scene() -> Scene {
+    scene_of(866.0, 10, 40, 20)
+}
+
+fn scene_of(room: f64, objects: usize, clutter: usize, scans: usize) -> Scene {
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let width = 200.0 * (objects as f64).sqrt();
+    let width = room * (objects as f64).sqrt();
     let states: Vec<[f64; 4]> = (0..objects)
         .map(|_| {
             let place = [random.random_range(0.0..width), random.random_range(0.0..width)];
@@ -124,6 +133,16 @@ fn bank() -> Imm<Kalman<Turn, Position<2>>> {
 #[divan::bench]
 fn imm_jpda_10_objects_40_clutter(bencher: Bencher) {
     one_scan_by(bencher, &scene(10, 40, 20), &bank(), Jpda::new(JpdaConfig::default()).unwrap());
+}
+
+#[divan::bench]
+fn imm_jpda_10_objects_40_clutter_wide(bencher: Bencher) {
+    one_scan_by(bencher, &wide_scene(), &bank(), Jpda::new(JpdaConfig::default()).unwrap());
+}
+
+#[divan::bench]
+fn imm_pmbm_10_objects_40_clutter_wide(bencher: Bencher) {
+    one_scan_by(bencher, &wide_scene(), &bank(), Pmbm::new(PmbmConfig::default()).unwrap());
 }
 
 #[divan::bench]

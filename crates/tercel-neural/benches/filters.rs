@@ -11,10 +11,12 @@ use divan::{Bencher, black_box};
 use tercel_core::extended::{Points, Scattering};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
+use tercel_core::multi::{Clutter, Detection, Phd, PhdConfig, Scan, Tracker};
 use tercel_core::sensor::{ConvertedPolar, Measurement, Position, RangeBearing};
 use tercel_neural::filter::{
     Architecture, Attention, BankNetwork, Covariance, Derivative, EnsKNets, EnsKNetsHyper, KalmanNet,
-    KalmanNetHyper, LiquidHyper, LiquidKalman, NeuralImm, Normalisation, RmmNet, RmmNetwork, Sign,
+    KalmanNetHyper, LiquidBelief, LiquidHyper, LiquidKalman, LiquidNetwork, NeuralImm, Normalisation, RmmNet,
+    RmmNetwork, Sign,
 };
 use tercel_neural::layer::CellShape;
 use tercel_neural::shipped;
@@ -112,6 +114,42 @@ fn liquid_predictions_of_500(bencher: Bencher, cell: &str) {
     bencher.bench_local(|| {
         let mut all: Vec<_> = beliefs.iter_mut().collect();
         filter.predict_all(black_box(&mut all), 1.0);
+    });
+}
+
+/// A scan of ten objects among 40 false detections, of a mixture at its cap of 500 components: hardly any is pruned.
+#[divan::bench]
+fn lnn_phd_at_cap_500_clutter_40(bencher: Bencher) {
+    let network = LiquidNetwork::from_model(&shipped::model("liquid").unwrap()).unwrap();
+    let filter = LiquidKalman::new(Arc::new(network), Position::new(5.0).unwrap());
+    let mut tracker =
+        Phd::new(PhdConfig { prune: 1e-60, merge: 0.1, cap: 500, ..PhdConfig::default() }).unwrap();
+    // Spread evenly without a pattern: multiples of irrational numbers.
+    let share = |number: u32, root: f64| (f64::from(number) * root).fract();
+    let measurements = |scan: u32| -> Vec<Measurement<2>> {
+        let object = |i: u32| {
+            let time = f64::from(scan);
+            let noise = |root| 10.0 * share(scan * 10 + i, root) - 5.0;
+            [270.0 * f64::from(i) + 10.0 * time + noise(0.732), 270.0 * f64::from(i) + noise(0.236)].into()
+        };
+        let clutter = |i: u32| {
+            let number = scan * 40 + i;
+            [2_738.0 * share(number, 0.414_213_56), 2_738.0 * share(number, 0.618_033_99)].into()
+        };
+        (0..10).map(object).chain((0..40).map(clutter)).collect()
+    };
+    let (detection, clutter) =
+        (Detection::uniform(0.95).unwrap(), Clutter::per_scan(40.0, 2_738.0 * 2_738.0).unwrap());
+    let step = |tracker: &mut Phd<LiquidBelief>, number: u32| {
+        let measurements = &measurements(number);
+        let time = f64::from(number);
+        let scan = Scan { time, measurements, detection: &detection, clutter: &clutter };
+        tracker.step(&filter, &scan).unwrap();
+    };
+    (0..40).for_each(|number| step(&mut tracker, number));
+    bencher.with_inputs(|| tracker.clone()).bench_local_values(|mut tracker| {
+        step(&mut tracker, 40);
+        tracker
     });
 }
 

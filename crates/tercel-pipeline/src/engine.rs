@@ -15,6 +15,7 @@ use tercel_data::table::{self, Scan};
 use crate::PipelineError;
 use crate::config::{self, Config, Estimator, MotionConfig, TrackerConfig};
 use crate::estimator::{Cloud, Mode, Recursion, Rule, Single, Switching};
+use crate::learned::Learned;
 use crate::numbered::Numbered;
 use crate::sensors::{self, Kind, Station};
 
@@ -30,6 +31,9 @@ pub(crate) struct Outcome {
 pub(crate) trait Engine {
     /// Takes in one scan of one sensor.
     fn step(&mut self, station: &Station, scan: &Scan) -> Result<Outcome, PipelineError>;
+
+    /// Names of the modes of a track; empty where there is one motion.
+    fn modes(&self) -> Vec<String>;
 }
 
 /// The engine that a configuration describes.
@@ -51,6 +55,10 @@ pub(crate) fn engine(config: &Config) -> Result<Box<dyn Engine>, PipelineError> 
         (MotionConfig::Switching(_), _) => {
             Err(PipelineError::config("motion.switching.modes", "at least one mode must have velocities"))
         }
+        (MotionConfig::Learned(motion), _) => match Learned::open(motion)? {
+            Learned::Liquid(liquid) => with_tracker(liquid, config),
+            Learned::Bank(bank) => with_tracker(bank, config),
+        },
         (motion, 2) => with_single::<2>(position_motion(motion)?, rule, config),
         (motion, 4) => with_single::<4>(velocity_motion(motion)?, rule, config),
         (motion, 5) => with_single::<5>(turn_motion(motion)?, rule, config),
@@ -171,6 +179,10 @@ where
             Kind::Bearing(sensor) => self.run(sensor, station, scan, &sensors::bearings(scan)?),
         }
     }
+
+    fn modes(&self) -> Vec<String> {
+        self.recursion.modes()
+    }
 }
 
 /// The tracks of a tracker as rows of the table.
@@ -217,7 +229,8 @@ fn modes<const N: usize>(
         _ => None,
     });
     let transition = Transition::sticky(switching.stay.get()).per(1.0);
-    let switching = Switching { modes, rule, transition, missing: missing.unwrap_or(1.0) };
+    let switching =
+        Switching { modes, names: switching.mode_names(), rule, transition, missing: missing.unwrap_or(1.0) };
     // Building the filter once, for any sensor, finds what is wrong with it before the first scan.
     let probe: tercel_core::sensor::Position<2> = tercel_core::sensor::Position::new(1.0)
         .map_err(|error| PipelineError::parameter("motion.switching", &error))?;

@@ -23,6 +23,11 @@ pub(crate) trait Recursion<const N: usize> {
         sensor: &dyn Sensor<N, M>,
         work: impl FnOnce(&dyn Filter<N, Belief = Self::Belief, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError>;
+
+    /// Names of the modes of an estimate, unique; empty where there is one motion.
+    fn modes(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// Which of the Gaussian recursions.
@@ -80,6 +85,7 @@ impl<const N: usize> Recursion<N> for Cloud<N> {
 /// Several models of motion, one of which holds at a time.
 pub(crate) struct Switching<const N: usize> {
     pub modes: Vec<Mode<N>>,
+    pub names: Vec<String>,
     pub rule: Rule,
     pub transition: Transition,
     /// Standard deviation of the components that a smaller mode lacks.
@@ -145,6 +151,10 @@ impl<const N: usize> Recursion<N> for Switching<N> {
         work: impl FnOnce(&dyn Filter<N, Belief = Self::Belief, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError> {
         Ok(work(&self.filter(sensor)?))
+    }
+
+    fn modes(&self) -> Vec<String> {
+        self.names.clone()
     }
 }
 

@@ -30,6 +30,7 @@ pub mod config;
 mod engine;
 mod error;
 mod estimator;
+mod learned;
 mod numbered;
 mod pipeline;
 mod reorder;

@@ -59,13 +59,14 @@ impl Pipeline {
             OutOfOrder::Drop => 0.0,
             OutOfOrder::Buffer => config.input.delay.get(),
         };
+        let engine = engine(config)?;
         Ok(Pipeline {
-            engine: engine(config)?,
+            modes: engine.modes(),
+            engine,
             stations: config.sensors.iter().map(station).collect::<Result<_, PipelineError>>()?,
             ignore: config.input.ignore.clone(),
             reorder: Reorder::new(delay),
             labels: config.motion.labels().iter().map(ToString::to_string).collect(),
-            modes: config.motion.mode_names(),
             summary: Summary::default(),
             confirmed: BTreeSet::new(),
             held: Vec::new(),

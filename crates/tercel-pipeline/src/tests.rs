@@ -44,6 +44,8 @@ fn every_motion_filter_and_sensor_tracks_a_plain_object() {
         "constant_acceleration = { jerk_density = 0.1 }".to_string(),
         "singer = { time = 10.0, acceleration = 1.0 }".to_string(),
         "coordinated_turn = { acceleration_density = 0.5, rate_density = 1e-4 }".to_string(),
+        "learned = { model = \"liquid\", speed = 15.0 }".to_string(),
+        "learned = { model = \"neural-imm-position\" }".to_string(),
         format!("switching = {{ stay = 0.95, modes = [{{ {STRAIGHT} }}, {turn}] }}"),
         format!(
             "switching = {{ stay = 0.95, modes = [{{ {STRAIGHT} }}, {{ constant_acceleration = {{ jerk_density = 0.1 }} }}] }}"
@@ -102,6 +104,46 @@ fn unscented_filters_and_particles_are_chosen_by_name() {
         ends.push(rows[0].state.clone());
     }
     assert!(ends[0] != ends[1] && ends[1] != ends[2], "three filters, three answers");
+}
+
+#[test]
+fn a_model_that_is_no_motion_or_is_not_there_is_refused() {
+    let refusal = |model: &str, sections: &str| {
+        let text = format!("learned = {{ model = \"{model}\" }}");
+        Pipeline::new(&config(&text, sections, POSITION)).err().unwrap().to_string()
+    };
+    let missing = refusal("mine.safetensors", "");
+    assert!(missing.contains("`motion.learned.model`") && missing.contains("mine.safetensors"), "{missing}");
+    assert!(missing.contains("neural-imm-position") && !missing.contains("rmmnet"), "{missing}");
+    let other = refusal("rmmnet-vehicle", "");
+    assert!(other.contains("of the kind `rmmnet`") && other.contains("`neural-imm`"), "{other}");
+    let text = format!(
+        "[motion]\nlearned = {{ model = \"liquid\" }}\n[filter]\nestimator = \"unscented\"\n\
+         [sensors.radar]\nmeasures = {POSITION}\nclutter = {{ uniform = {{ density = 1e-7 }} }}"
+    );
+    assert!(Config::parse(&text).unwrap_err().to_string().contains("has a filter of its own"));
+}
+
+#[test]
+fn files_of_models_are_found_from_the_folder_of_the_configuration() {
+    let folder = std::path::Path::new("conf");
+    let model = |name: &str| {
+        let config = config(&format!("learned = {{ model = \"{name}\" }}"), "", POSITION).in_folder(folder);
+        match config.motion {
+            crate::config::MotionConfig::Learned(motion) => motion.model,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(model("liquid"), "liquid");
+    assert_eq!(std::path::Path::new(&model("boats.safetensors")), folder.join("boats.safetensors"));
+}
+
+#[test]
+fn a_learned_bank_names_its_turns() {
+    let motion = "learned = { model = \"neural-imm-position\" }";
+    let pipeline = Pipeline::new(&config(motion, "", POSITION)).unwrap();
+    assert_eq!(pipeline.modes()[..3], ["straight", "left_2", "right_2"]);
+    assert_eq!(pipeline.modes().len(), 13);
 }
 
 #[test]

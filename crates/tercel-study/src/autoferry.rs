@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use tercel_data::table::{Detections, Metric, Metrics, Tracks, Truths};
 use tercel_data::{AtomicFile, ImportOptions, Source, import};
-use tercel_pipeline::config::presets;
+use tercel_pipeline::config::{MotionConfig, presets};
 use tercel_pipeline::{Config, Pipeline};
 
 use crate::error::StudyError;
@@ -21,8 +21,15 @@ use crate::table::{Figure, Row, StudyTable};
 pub const NAME: &str = "autoferry";
 
 /// What can be compared.
-pub const METHODS: [&str; 5] =
-    ["nearest-neighbour", "phd", "imm-pmbm", "nearest-neighbour-loo", "imm-pmbm-loo"];
+pub const METHODS: [&str; 7] = [
+    "nearest-neighbour",
+    "phd",
+    "imm-pmbm",
+    "lnn-pmbm",
+    "lnn-imm-pmbm",
+    "nearest-neighbour-loo",
+    "imm-pmbm-loo",
+];
 
 /// The columns of the table.
 pub const COLUMNS: [&str; 11] = [
@@ -264,10 +271,15 @@ fn shipped(method: &str) -> Result<Config, StudyError> {
     let preset = match method {
         "phd" => "harbour-phd",
         "imm-pmbm" => "harbour-pmbm",
+        "lnn-pmbm" | "lnn-imm-pmbm" => "harbour-learned",
         _ => "harbour",
     };
     // The presets are part of the program, and a test reads each.
-    Ok(Config::parse(presets::get(preset).unwrap_or_default())?)
+    let mut config = Config::parse(presets::get(preset).unwrap_or_default())?;
+    if let ("lnn-pmbm", MotionConfig::Learned(motion)) = (method, &mut config.motion) {
+        motion.model = "liquid".to_owned();
+    }
+    Ok(config)
 }
 
 fn row(method: &str, results: &[Scored], seed: u64) -> Row {

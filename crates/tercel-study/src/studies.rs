@@ -130,7 +130,7 @@ fn boxed<E: Experiment + 'static>(
 }
 
 /// All studies.
-pub const STUDIES: [Study; 14] = [
+pub const STUDIES: [Study; 16] = [
     Study {
         name: "atc-test",
         about: "one aircraft that turns, seen by a radar: the published test set (Table 3)",
@@ -199,6 +199,12 @@ pub const STUDIES: [Study; 14] = [
         })),
     },
     Study {
+        name: "vehicle-data",
+        about: "how many vehicles networks must have seen (Fig. 5)",
+        methods: &extended::methods::DATA_METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo::new(extended::SEED, 40, |r| boxed(ExtendedExperiment::data(r)))),
+    },
+    Study {
         name: "aircraft",
         about: "airliners on recorded tracks, seen as many points (RMMNet paper, Table II)",
         methods: &extended::methods::AIRCRAFT_METHODS,
@@ -206,6 +212,16 @@ pub const STUDIES: [Study; 14] = [
             sets: &["course", "smoothed", "crab", "even"],
             data: true,
             ..MonteCarlo::new(extended::SEED, 52, |r| boxed(ExtendedExperiment::aircraft(r)))
+        }),
+    },
+    Study {
+        name: "aircraft-random",
+        about: "the same with tracks to test on that are drawn from all",
+        methods: &extended::methods::RANDOM_METHODS,
+        kind: Kind::MonteCarlo(MonteCarlo {
+            sets: &["course", "smoothed", "crab", "even"],
+            data: true,
+            ..MonteCarlo::new(extended::SEED, 52, |r| boxed(ExtendedExperiment::aircraft_random(r)))
         }),
     },
     Study {
@@ -478,6 +494,7 @@ mod tests {
             "atc-ablation",
             "vehicle",
             "vehicle-ablation",
+            "vehicle-data",
             "extended-scene",
             "clutter-all",
             "clutter-random",

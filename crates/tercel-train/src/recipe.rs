@@ -134,9 +134,39 @@ pub struct Outline {
     /// When the parameters change.
     #[serde(default)]
     pub schedule: ScheduleConfig,
+    #[serde(default)]
+    data: OutlineData,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+struct OutlineData {
+    #[serde(default)]
+    source: OutlineSource,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+struct OutlineSource {
+    #[serde(default)]
+    test: TestTracks,
+}
+
+/// Which of the recorded tracks are those of a study, and not to learn from: a fifth of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TestTracks {
+    /// The last ones, of the study `aircraft`.
+    #[default]
+    Last,
+    /// Those of the study `aircraft-random`.
+    Random,
 }
 
 impl Outline {
+    /// Which of the recorded tracks must not be given to the training.
+    pub fn test_tracks(&self) -> TestTracks {
+        self.data.source.test
+    }
+
     /// Reads what all recipes have in common. The sections of the kind are not looked at.
     ///
     /// # Errors

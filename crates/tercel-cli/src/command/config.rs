@@ -108,17 +108,18 @@ impl InitArguments {
 
 /// Reads a configuration and builds its tracker, which finds what no single key can say.
 pub fn read(path: &Path) -> Result<(Config, Pipeline), Failure> {
-    build(&path.to_string_lossy(), &read_text(path)?)
+    build(&path.to_string_lossy(), &read_text(path)?, path.parent().unwrap_or(Path::new("")))
 }
 
 /// One of the configurations that come with the program.
 pub fn preset(name: &str) -> Result<(Config, Pipeline), Failure> {
-    build(name, presets::get(name).unwrap_or_default())
+    build(name, presets::get(name).unwrap_or_default(), Path::new(""))
 }
 
-fn build(name: &str, text: &str) -> Result<(Config, Pipeline), Failure> {
+/// Files that the configuration names are looked for from `folder`.
+fn build(name: &str, text: &str, folder: &Path) -> Result<(Config, Pipeline), Failure> {
     let build = || {
-        let config = Config::parse(text)?;
+        let config = Config::parse(text)?.in_folder(folder);
         let pipeline = Pipeline::new(&config)?;
         Ok((config, pipeline))
     };

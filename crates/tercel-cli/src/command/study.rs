@@ -102,7 +102,9 @@ Studies:
   atc-ablation     what the parts of the published ensemble are worth
   vehicle          one vehicle seen as many points: motion and ellipse (--set backward or forward)
   vehicle-ablation what the blocks of RMMNet are worth
+  vehicle-data     how many vehicles networks must have seen
   aircraft         airliners on recorded tracks (--set course, smoothed, crab or even)
+  aircraft-random  the same with tracks to test on that are drawn from all
   extended-scene   three extended objects that cross among false points
   clutter-partial  nine objects in dense clutter, two of which manoeuvre
   clutter-all      six objects in clutter that all manoeuvre at once

@@ -5,6 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::correction::Comparison;
 use super::{Filter, Innovation, sampling};
 use crate::belief::{Cholesky, Gaussian, positive};
 use crate::error::FilterError;
@@ -35,7 +36,7 @@ use crate::sensor::{Measurement, Reading, Sensor};
 /// ## Reference
 /// Gordon, Salmond and Smith (1993), algorithm of section 3; systematic resampling of Kitagawa (1996), appendix.
 /// Deviations: weights in the log domain; resampling only below a number of effective particles (Liu and Chen (1998)); smoothing, when asked for, as Liu and West
-/// (2001), section 10.3.
+/// (2001), section 10.3. The Gaussian beginning ([`with_tentative`](Particle::with_tentative)) is a step of the Gaussian particle filter of Kotecha and Djurić (2003).
 ///
 /// ```
 /// use tercel_core::{filter::{Filter, Particle}, motion::ConstantVelocity, sensor::RangeBearing};
@@ -58,6 +59,7 @@ pub struct Particle<T, S, const M: usize = 2> {
     seed: u64,
     threshold: f64,
     smoothing: f64,
+    tentative: usize,
 }
 
 /// What a [`Particle`] filter knows of one object: weighted states, and the generator that moves them on.
@@ -203,15 +205,21 @@ impl<const N: usize, U: Clone> Particles<N, U> {
     /// Moves and stretches the cloud to this mean and covariance. One that has no extent to stretch is drawn anew.
     fn reshape(&mut self, target: &Gaussian<N>) {
         let current = self.moments();
-        let to = positive::root(&target.covariance);
         if let Some(from) = extent(&current) {
+            let to = positive::root(&target.covariance);
             for state in &mut self.states {
                 *state = target.mean + to * from.whiten(&(*state - current.mean));
             }
             return;
         }
+        self.draw(target);
+    }
+
+    /// Draws all particles anew.
+    fn draw(&mut self, target: &Gaussian<N>) {
+        let root = positive::root(&target.covariance);
         for state in &mut self.states {
-            *state = target.mean + to * normal(&mut self.random);
+            *state = target.mean + root * normal(&mut self.random);
         }
         let even = -(self.states.len() as f64).ln();
         self.weights.fill(even);
@@ -241,7 +249,7 @@ impl<T, S, const M: usize> Particle<T, S, M> {
             let (parameter, expected) = ("number of particles", "must be at least 10");
             return Err(FilterError::Parameter { parameter, value: count as f64, expected });
         }
-        Ok(Particle { motion, sensor, count, seed, threshold: 0.5, smoothing: 0.0 })
+        Ok(Particle { motion, sensor, count, seed, threshold: 0.5, smoothing: 0.0, tentative: count })
     }
 
     /// Sets the share of effective particles below which they are resampled; 0 never does, 1 always. The default is 0.5.
@@ -263,6 +271,31 @@ impl<T, S, const M: usize> Particle<T, S, M> {
     /// Unless it lies between 0 and 1.
     pub fn with_smoothing(self, share: f64) -> Result<Self, FilterError> {
         Ok(Particle { smoothing: FilterError::probability("smoothing of particles", share)?, ..self })
+    }
+
+    /// Sets the number of particles before the second measurement of an object, whose first one its birth is. The default is that
+    /// of all.
+    ///
+    /// Nearly all objects that a tracker starts in clutter are never measured again, and need no more than some dozens of particles
+    /// to be so. For there is no other shape yet than the Gaussian of the birth, moved a few steps: the few particles have exactly
+    /// its moments, the second measurement updates these as in an extended Kalman filter, and all particles are drawn from the
+    /// result. That places more of them where they count than weighing the first ones would, too. Where the motion, or a sensor
+    /// such as a bearing, bends a new object's belief out of that shape, leave the default.
+    ///
+    /// # Errors
+    /// Unless it lies between 10 and the number of particles.
+    pub fn with_tentative(self, count: usize) -> Result<Self, FilterError> {
+        if !(FEWEST..=self.count).contains(&count) {
+            let parameter = "number of particles before the second measurement";
+            let expected = "must be between 10 and the number of particles";
+            return Err(FilterError::Parameter { parameter, value: count as f64, expected });
+        }
+        Ok(Particle { tentative: count, ..self })
+    }
+
+    /// Whether there was no measurement after the first.
+    fn is_tentative<const N: usize, U>(&self, belief: &Particles<N, U>) -> bool {
+        belief.states.len() < self.count
     }
 
     /// How the measurement compares with each particle: the innovation, after `each` has seen the logarithms of the
@@ -322,10 +355,15 @@ where
         let start = self.sensor.birth(measurement, &self.motion.prior())?;
         let lower = *Cholesky::new(&start.covariance, "state covariance")?.lower();
         let mut random = ChaCha8Rng::seed_from_u64(sampling::seed_of(self.seed, measurement));
-        let states: Vec<_> = (0..self.count).map(|_| start.mean + lower * normal(&mut random)).collect();
-        let weights = vec![-(self.count as f64).ln(); self.count];
-        let memories = (0..self.count).map(|_| self.motion.start(&mut random)).collect();
-        Ok(Particles { states, memories, weights, random, room: Room::new(self.count) })
+        let count = self.tentative;
+        let states: Vec<_> = (0..count).map(|_| start.mean + lower * normal(&mut random)).collect();
+        let weights = vec![-(count as f64).ln(); count];
+        let memories = (0..count).map(|_| self.motion.start(&mut random)).collect();
+        let mut belief = Particles { states, memories, weights, random, room: Room::new(count) };
+        if self.is_tentative(&belief) {
+            belief.reshape(&start);
+        }
+        Ok(belief)
     }
 
     fn predict(&self, belief: &mut Particles<N, T::Memory>, dt: f64) {
@@ -338,6 +376,14 @@ where
         belief: &mut Particles<N, T::Memory>,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
+        if self.is_tentative(belief) {
+            let mut state = belief.moments();
+            let comparison = Comparison::new(&self.sensor, &state, measurement)?;
+            comparison.condition(&self.sensor, &mut state)?;
+            belief.resample(self.count, None);
+            belief.draw(&state);
+            return Ok(comparison.innovation);
+        }
         let mut weights = std::mem::take(&mut belief.room.weights);
         weights.clear();
         let innovation = self.compare(belief, measurement, |ln| weights.push(ln));
@@ -361,6 +407,9 @@ where
         belief: &Particles<N, T::Memory>,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
+        if self.is_tentative(belief) {
+            return Ok(Comparison::new(&self.sensor, &belief.moments(), measurement)?.innovation);
+        }
         self.compare(belief, measurement, |_| ())
     }
 
@@ -388,7 +437,8 @@ where
         }
         let mut target = belief.moments();
         target.merge(weight, &other.moments(), other_weight);
-        belief.resample(self.count, Some((other, other_weight / total)));
+        let count = belief.states.len().max(other.states.len());
+        belief.resample(count, Some((other, other_weight / total)));
         belief.reshape(&target);
     }
 

@@ -130,7 +130,10 @@ impl TurnBank {
     ///
     /// # Errors
     /// When the transition does not fit the number of rates.
-    pub fn filter<S: Clone>(&self, sensor: S) -> Result<Imm<Extended<Turn, S>>, FilterError> {
+    pub fn filter<S: Clone, const M: usize>(
+        &self,
+        sensor: S,
+    ) -> Result<Imm<Extended<Turn, S, M>>, FilterError> {
         self.estimating(std::slice::from_ref(&sensor))
     }
 
@@ -138,7 +141,10 @@ impl TurnBank {
     ///
     /// # Errors
     /// When there is no sensor, or the transition does not fit the number of rates.
-    pub fn estimating<S: Clone>(&self, sensors: &[S]) -> Result<Imm<Extended<Turn, S>>, FilterError> {
+    pub fn estimating<S: Clone, const M: usize>(
+        &self,
+        sensors: &[S],
+    ) -> Result<Imm<Extended<Turn, S, M>>, FilterError> {
         let sensors_stay = (Transition::sticky(1.0), sensors.len());
         let noises = (self.noise_transition.clone(), self.noises.len());
         let rates = (self.transition.clone(), self.rates.len());
@@ -146,7 +152,10 @@ impl TurnBank {
         Imm::new(sensors.iter().flat_map(|sensor| self.modes(sensor)), transition)
     }
 
-    fn modes<'a, S: Clone>(&'a self, sensor: &'a S) -> impl Iterator<Item = Extended<Turn, S>> + 'a {
+    fn modes<'a, S: Clone, const M: usize>(
+        &'a self,
+        sensor: &'a S,
+    ) -> impl Iterator<Item = Extended<Turn, S, M>> + 'a {
         self.noises.iter().flat_map(move |noise| {
             let turn = |rate: &f64| Turn::with_noise(*rate, *noise).with_speed(self.speed);
             self.rates.iter().map(move |rate| Extended::new(turn(rate), sensor.clone()))
@@ -226,6 +235,6 @@ mod tests {
         let bank = TurnBank::evenly(0.1, 0).unwrap();
         assert_eq!(bank.rates(), [0.0]);
         assert!(bank.clone().with_noises([]).is_err());
-        assert!(bank.estimating::<Position<2>>(&[]).is_err());
+        assert!(bank.estimating::<Position<2>, 2>(&[]).is_err());
     }
 }

@@ -53,6 +53,14 @@ impl FilterConfig {
                 );
                 Err(PipelineError::config("filter.estimator", &reason))
             }
+            (Estimator::Kalman | Estimator::Unscented | Estimator::Particle, _)
+                if matches!(motion, MotionConfig::Learned(_)) =>
+            {
+                Err(PipelineError::config(
+                    "filter.estimator",
+                    "a learned motion has a filter of its own; leave this key out",
+                ))
+            }
             (Estimator::Kalman, None) if !motion.is_linear() => Err(PipelineError::config(
                 "filter.estimator",
                 "coordinated_turn is not linear; use \"extended\", \"unscented\" or \"particle\"",

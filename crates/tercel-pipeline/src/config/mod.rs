@@ -10,6 +10,7 @@ mod sensor;
 mod tracker;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::PipelineError;
 
 pub use filter::{Estimator, FilterConfig};
-pub use motion::{AccelerationModel, MotionConfig, Singer, Switching, TurnModel};
+pub use motion::{AccelerationModel, LearnedMotion, MotionConfig, Singer, Switching, TurnModel};
 pub use number::{Count, NonNegative, Positive, Probability};
 pub use sensor::{
     Bearing, ClutterConfig, DetectionConfig, MapClutter, Measures, Polar, PositionSensor, SensorConfig,
@@ -81,6 +82,16 @@ impl Config {
         let config: Config = toml::from_str(text).map_err(|error| PipelineError::Syntax(Box::new(error)))?;
         config.check()?;
         Ok(config)
+    }
+
+    /// The same, with files that are named relative to this folder.
+    pub fn in_folder(mut self, folder: &Path) -> Self {
+        if let MotionConfig::Learned(motion) = &mut self.motion
+            && !tercel_neural::shipped::NAMES.contains(&motion.model.as_str())
+        {
+            motion.model = folder.join(&motion.model).to_string_lossy().into_owned();
+        }
+        self
     }
 
     /// The configuration as TOML.

@@ -55,6 +55,8 @@ pub enum MotionConfig {
     },
     /// Switches between motions: an interacting multiple model filter with one mode for each.
     Switching(Switching),
+    /// As a network has learned it. State: x, y, vx, vy.
+    Learned(LearnedMotion),
 }
 
 /// Straight motion with random accelerations.
@@ -114,6 +116,18 @@ pub struct Switching {
     pub stay: Probability,
 }
 
+/// A motion that was learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LearnedMotion {
+    /// A model of the kind `liquid` or `neural-imm`: the name of one that comes with Tercel, or a file that `tercel train` wrote,
+    /// from the folder of the configuration.
+    pub model: String,
+    /// Standard deviation of a new object's velocity, per axis. The default is that of the training.
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub speed: Option<Positive>,
+}
+
 fn default_speed() -> Positive {
     Positive::constant(30.0)
 }
@@ -137,6 +151,7 @@ impl MotionConfig {
             MotionConfig::Turn(_) => "turn",
             MotionConfig::CoordinatedTurn { .. } => "coordinated_turn",
             MotionConfig::Switching(_) => "switching",
+            MotionConfig::Learned(_) => "learned",
         }
     }
 
@@ -144,7 +159,9 @@ impl MotionConfig {
     pub fn labels(&self) -> &'static [&'static str] {
         match self {
             MotionConfig::RandomWalk { .. } => &["x", "y"],
-            MotionConfig::ConstantVelocity(_) | MotionConfig::Turn(_) => &["x", "y", "vx", "vy"],
+            MotionConfig::ConstantVelocity(_) | MotionConfig::Turn(_) | MotionConfig::Learned(_) => {
+                &["x", "y", "vx", "vy"]
+            }
             MotionConfig::CoordinatedTurn { .. } => &["x", "y", "vx", "vy", "turn_rate"],
             MotionConfig::ConstantAcceleration { .. } | MotionConfig::Singer(_) => {
                 &["x", "y", "vx", "vy", "ax", "ay"]
@@ -158,22 +175,10 @@ impl MotionConfig {
         }
     }
 
-    /// Names of the modes, unique: the models with a number where one occurs again. Empty for a single motion.
-    pub fn mode_names(&self) -> Vec<String> {
-        let MotionConfig::Switching(switching) = self else { return Vec::new() };
-        let name = |index: usize| switching.modes[index].name();
-        (0..switching.modes.len())
-            .map(|index| match (0..index).filter(|&before| name(before) == name(index)).count() {
-                0 => name(index).to_string(),
-                earlier => format!("{}_{}", name(index), earlier + 1),
-            })
-            .collect()
-    }
-
     /// Whether a Kalman filter is exact for it.
     pub(crate) fn is_linear(&self) -> bool {
         match self {
-            MotionConfig::CoordinatedTurn { .. } => false,
+            MotionConfig::CoordinatedTurn { .. } | MotionConfig::Learned(_) => false,
             MotionConfig::Switching(switching) => switching.modes.iter().all(MotionConfig::is_linear),
             _ => true,
         }
@@ -191,6 +196,17 @@ impl MotionConfig {
 }
 
 impl Switching {
+    /// Names of the modes, unique: the models with a number where one occurs again.
+    pub fn mode_names(&self) -> Vec<String> {
+        let name = |index: usize| self.modes[index].name();
+        (0..self.modes.len())
+            .map(|index| match (0..index).filter(|&before| name(before) == name(index)).count() {
+                0 => name(index).to_string(),
+                earlier => format!("{}_{}", name(index), earlier + 1),
+            })
+            .collect()
+    }
+
     fn check(&self, key: &str) -> Result<(), PipelineError> {
         if self.modes.len() < 2 {
             return Err(PipelineError::config(&format!("{key}.modes"), "there must be at least two modes"));
@@ -204,6 +220,10 @@ impl Switching {
             let key = format!("{key}.modes[{number}]");
             if matches!(mode, MotionConfig::Switching(_)) {
                 return Err(PipelineError::config(&key, "a mode cannot switch itself; list its modes here"));
+            }
+            if matches!(mode, MotionConfig::Learned(_)) {
+                let reason = "a learned motion cannot be a mode; it stands alone as [motion.learned]";
+                return Err(PipelineError::config(&key, reason));
             }
             if !whole.labels().starts_with(mode.labels()) {
                 let reason = format!(

@@ -1,11 +1,12 @@
 //! Configurations to start from.
 
 /// Name and text of each preset.
-const PRESETS: [(&str, &str); 8] = [
+const PRESETS: [(&str, &str); 9] = [
     ("default", include_str!("../../presets/default.toml")),
     ("harbour", include_str!("../../presets/harbour.toml")),
     ("harbour-phd", include_str!("../../presets/harbour_phd.toml")),
     ("harbour-pmbm", include_str!("../../presets/harbour_pmbm.toml")),
+    ("harbour-learned", include_str!("../../presets/harbour_learned.toml")),
     ("air-surveillance", include_str!("../../presets/air_surveillance.toml")),
     ("air-traffic", include_str!("../../presets/air_traffic.toml")),
     ("adsb", include_str!("../../presets/adsb.toml")),

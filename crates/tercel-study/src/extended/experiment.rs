@@ -6,13 +6,13 @@ use tercel_core::motion::Kinematics;
 use tercel_neural::shipped::Models;
 use tercel_sim::extended::{Generator, Heading, Sizes, Vehicle};
 
-use super::methods::method;
+use super::methods::{DATA_MODELS, method};
 use super::published::{PUBLISHED, PublishedRow};
 use super::score::{METRICS, score};
 use super::settings::Settings;
-use super::{Aircraft, Method, Recording, Scene, example};
+use super::{Aircraft, Held, Method, Recording, Scene, example};
 use crate::StudyError;
-use crate::monte_carlo::{Attempt, Curve, Example, Experiment, Plan, Quantity};
+use crate::monte_carlo::{Attempt, Curve, Example, Experiment, Plan, Quantity, Sweep};
 use crate::report::{Section, Table};
 use crate::studies::{Request, options_of};
 
@@ -26,7 +26,8 @@ const PUBLISHED_TRACKS: usize = 52;
 pub struct ExtendedExperiment {
     plan: Plan,
     scene: Scene,
-    methods: Vec<Box<dyn Method>>,
+    /// The methods under each condition.
+    methods: Vec<Vec<Box<dyn Method>>>,
 }
 
 impl ExtendedExperiment {
@@ -43,8 +44,8 @@ impl ExtendedExperiment {
         (seed, runs): (u64, u64),
         (names, models): (&[String], &Models),
     ) -> Result<Self, StudyError> {
-        let methods =
-            names.iter().map(|name| method(study, name, settings, models)).collect::<Result<_, _>>()?;
+        let methods: Result<_, StudyError> =
+            names.iter().map(|name| method(study, name, settings, models)).collect();
         let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
             name: name.to_owned(),
             unit: unit.to_owned(),
@@ -60,7 +61,7 @@ impl ExtendedExperiment {
             metrics: METRICS.map(quantity).to_vec(),
             curves: curves(&scene),
         };
-        Ok(ExtendedExperiment { plan, scene, methods })
+        Ok(ExtendedExperiment { plan, scene, methods: vec![methods?] })
     }
 
     /// The study `vehicle`.
@@ -99,8 +100,46 @@ impl ExtendedExperiment {
         Self::new("vehicle-ablation", scene, &Settings::REJECT, BTreeMap::new(), drawn, chosen)
     }
 
+    /// The study `vehicle-data`: how much networks must have seen.
+    pub(crate) fn data(request: &Request<'_>) -> Result<Self, StudyError> {
+        const STUDY: &str = "vehicle-data";
+        let scene = Scene::Vehicle(Vehicle::new(Generator::Reject));
+        let drawn = (request.seed, request.runs);
+        let chosen = (request.methods, request.models);
+        let first = Self::new(STUDY, scene, &Settings::REJECT, BTreeMap::new(), drawn, chosen)?;
+        let learned = |models: [&'static str; 3]| {
+            let [lstm, transformer, rmmnet] = models;
+            let settings = Settings { lstm, transformer, rmmnet, ..Settings::REJECT };
+            let methods = request.methods.iter();
+            methods.map(|name| method(STUDY, name, &settings, request.models)).collect()
+        };
+        let methods = DATA_MODELS.iter().map(|(_, models)| learned(*models));
+        let sweep = Sweep {
+            name: "trajectories".to_owned(),
+            label: "Vehicles to learn from".to_owned(),
+            values: DATA_MODELS.iter().map(|(count, _)| f64::from(*count)).collect(),
+        };
+        let plan = Plan { sweep: Some(sweep), curves: Vec::new(), ..first.plan };
+        Ok(ExtendedExperiment { plan, methods: methods.collect::<Result<_, StudyError>>()?, ..first })
+    }
+
+    /// The study `aircraft-random`: `aircraft` with other tracks to test on.
+    pub(crate) fn aircraft_random(request: &Request<'_>) -> Result<Self, StudyError> {
+        let settings = Settings { rmmnet: "rmmnet-aircraft-random", ..Settings::AIRCRAFT };
+        Self::on_tracks("aircraft-random", Held::Random, &settings, request)
+    }
+
     /// The study `aircraft`.
     pub(crate) fn aircraft(request: &Request<'_>) -> Result<Self, StudyError> {
+        Self::on_tracks("aircraft", Held::Last, &Settings::AIRCRAFT, request)
+    }
+
+    fn on_tracks(
+        study: &'static str,
+        held: Held,
+        settings: &Settings,
+        request: &Request<'_>,
+    ) -> Result<Self, StudyError> {
         let heading = match request.set {
             "smoothed" => Heading::Smoothed,
             "crab" => Heading::Crab,
@@ -108,7 +147,7 @@ impl ExtendedExperiment {
         };
         // The study asks for data before it is built.
         let path = request.data.unwrap_or(std::path::Path::new(""));
-        let aircraft = Aircraft::read(path, heading, true)?;
+        let aircraft = Aircraft::test(path, heading, held)?;
         let aircraft = if request.set == "even" { aircraft.evened() } else { aircraft };
         let count = aircraft.count() as u64;
         if request.chosen_runs && request.runs > count {
@@ -121,21 +160,16 @@ impl ExtendedExperiment {
         let data = ("data".to_owned(), path.display().to_string());
         let drawn = (request.seed, request.runs.min(count));
         let scene = Scene::Aircraft(aircraft);
-        Self::new(
-            "aircraft",
-            scene,
-            &Settings::AIRCRAFT,
-            [set, data].into(),
-            drawn,
-            (request.methods, request.models),
-        )
+        Self::new(study, scene, settings, [set, data].into(), drawn, (request.methods, request.models))
     }
 
     /// Whether the scenes are those of the publication, as far as it describes them.
     fn is_published(&self) -> bool {
         match &self.scene {
             Scene::Vehicle(_) => self.plan.options.get("sizes").is_none_or(|sizes| sizes == "fixed"),
-            Scene::Aircraft(aircraft) => aircraft.count() == PUBLISHED_TRACKS,
+            Scene::Aircraft(aircraft) => {
+                self.plan.study == "aircraft" && aircraft.count() == PUBLISHED_TRACKS
+            }
         }
     }
 
@@ -180,7 +214,7 @@ impl Experiment for ExtendedExperiment {
         &self.plan
     }
 
-    fn run(&self, _condition: usize, run: u64) -> Vec<Attempt> {
+    fn run(&self, condition: usize, run: u64) -> Vec<Attempt> {
         match self.record(run) {
             Ok(recording) => {
                 let steps = recording.scans.len() as u64;
@@ -191,12 +225,12 @@ impl Experiment for ExtendedExperiment {
                         |estimates| score(&recording, &estimates),
                     )
                 };
-                self.methods.iter().map(|method| attempt(&**method)).collect()
+                self.methods[condition].iter().map(|method| attempt(&**method)).collect()
             }
             Err(error) => {
                 let failed =
                     || Attempt { outcome: Err(error.to_string()), time: Default::default(), steps: 0 };
-                self.methods.iter().map(|_| failed()).collect()
+                self.plan.methods.iter().map(|_| failed()).collect()
             }
         }
     }
@@ -206,7 +240,8 @@ impl Experiment for ExtendedExperiment {
     }
 
     fn sections(&self) -> Vec<Section> {
-        vec![published_table(&self.plan.study).into()]
+        let published = PUBLISHED.iter().any(|row| row.study == self.plan.study);
+        published.then(|| published_table(&self.plan.study).into()).into_iter().collect()
     }
 
     fn example(&self) -> Result<Option<Example>, StudyError> {
@@ -214,7 +249,8 @@ impl Experiment for ExtendedExperiment {
             return Ok(None);
         }
         let recording = self.record(0)?;
-        let names = self.plan.methods.iter().zip(&self.methods);
+        // The last condition shows most.
+        let names = self.plan.methods.iter().zip(self.methods.last().into_iter().flatten());
         let followed: Vec<_> = names
             .filter_map(|(name, method)| Some((name.as_str(), method.follow(&recording).ok()?)))
             .collect();

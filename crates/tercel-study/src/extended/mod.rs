@@ -13,5 +13,5 @@ pub(crate) mod tables;
 pub use experiment::{ExtendedExperiment, SEED};
 pub use published::{PUBLISHED, PublishedRow};
 pub use recording::{Method, Recording, StepEstimate};
-pub use scene::{Aircraft, Scene};
+pub use scene::{Aircraft, Held, Scene};
 pub use score::METRICS;

@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix2, Vector2, Vector4};
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
 use tercel_sim::extended::{Heading, Ride, Scatterers, Vehicle};
 
 use super::Recording;
@@ -64,16 +67,45 @@ impl Scene {
     }
 }
 
+/// Which tracks are held back to test on: one in five.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Held {
+    /// The last ones, as in the publication.
+    Last,
+    /// Some that are drawn from all, the same ones each time.
+    Random,
+}
+
+impl Held {
+    /// The tracks for tuning and training, and those to test on.
+    fn parts<T>(self, mut tracks: Vec<T>) -> [Vec<T>; 2] {
+        if self == Held::Random {
+            tracks.shuffle(&mut ChaCha8Rng::seed_from_u64(SHUFFLE));
+        }
+        let test = tracks.split_off(tracks.len() * 4 / 5);
+        [tracks, test]
+    }
+}
+
+/// The seed by which tracks to test on are drawn.
+const SHUFFLE: u64 = 20;
+
 impl Aircraft {
     /// The tracks of a NumPy file, or of the only one in a folder: an array of `(tracks, steps, 4)` with `x,
     /// y, vx, vy`.
     ///
-    /// The first four fifths of the tracks are for tuning and training; `test` takes the others. The interval
-    /// is the one that fits positions and velocities, which must be differences backwards in time.
+    /// Four fifths of the tracks are for tuning and training; here are the others. The interval is the one that fits positions and
+    /// velocities, which must be differences backwards in time.
     ///
     /// # Errors
     /// When there is no such file, or its array does not fit.
-    pub fn read(path: &Path, heading: Heading, test: bool) -> Result<Self, StudyError> {
+    pub fn test(path: &Path, heading: Heading, held: Held) -> Result<Self, StudyError> {
+        let aircraft = Aircraft::read(path, heading)?;
+        let [_, tracks] = held.parts(aircraft.tracks);
+        Ok(Aircraft { tracks, ..aircraft })
+    }
+
+    fn read(path: &Path, heading: Heading) -> Result<Self, StudyError> {
         let path = file_of(path)?;
         let array = tercel_data::read_npy(&path)?;
         let refused = |problem: String| StudyError::Tracks { path: path.clone(), problem };
@@ -96,17 +128,17 @@ impl Aircraft {
             let problem = format!("positions and velocities fit to steps of {interval:.3e} s; {COLUMNS}");
             return Err(refused(problem));
         }
-        let tuning = count * 4 / 5;
-        let tracks = if test { tracks[tuning..].to_vec() } else { tracks[..tuning].to_vec() };
         Ok(Aircraft { tracks, interval, heading })
     }
 
     /// The tracks for tuning and training, of which none is in the test.
     ///
     /// # Errors
-    /// As [`read`](Aircraft::read).
-    pub fn training(path: &Path) -> Result<Self, StudyError> {
-        Aircraft::read(path, Heading::Course, false)
+    /// As [`test`](Aircraft::test).
+    pub fn training(path: &Path, held: Held) -> Result<Self, StudyError> {
+        let aircraft = Aircraft::read(path, Heading::Course)?;
+        let [tracks, _] = held.parts(aircraft.tracks);
+        Ok(Aircraft { tracks, ..aircraft })
     }
 
     /// The same tracks with velocities that are means over seven steps, three to either side, and the positions to which they
@@ -204,6 +236,19 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_track_is_to_learn_from_or_to_test_on() {
+        for (held, last) in [(Held::Last, true), (Held::Random, false)] {
+            let [training, test] = held.parts((0..260).collect());
+            assert_eq!((training.len(), test.len()), (208, 52));
+            let mut all: Vec<i32> = training.iter().chain(&test).copied().collect();
+            assert_eq!(all.is_sorted(), last);
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..260));
+            assert_eq!(held.parts((0..260).collect()), [training, test]);
+        }
+    }
+
+    #[test]
     fn the_interval_is_found_and_velocities_of_something_else_are_refused() {
         let track = |lag: f64| -> Vec<Vector4<f64>> {
             let turn = |step: u32| 0.3 * f64::from(step);
@@ -225,7 +270,7 @@ mod tests {
     #[test]
     fn a_folder_without_an_array_says_what_is_missing() {
         let folder = tempfile::tempdir().unwrap();
-        let error = Aircraft::read(folder.path(), Heading::Course, true).unwrap_err().to_string();
+        let error = Aircraft::test(folder.path(), Heading::Course, Held::Last).unwrap_err().to_string();
         assert!(error.contains("0 files named *.npy") && error.contains("--data"), "{error}");
     }
 }

@@ -40,8 +40,8 @@ pub struct TrainArguments {
     /// Threads to use; without it, one for each core. The result does not depend on them.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Recorded tracks, for recipes that learn from them: a NumPy array, or a folder with one. The last fifth, on which the
-    /// study aircraft tests, is left out.
+    /// Recorded tracks, for recipes that learn from them: a NumPy array, or a folder with one. A fifth of them, on which a
+    /// study tests, is left out.
     #[arg(long, value_name = "PATH")]
     data: Option<PathBuf>,
     /// Licence of the weights, for the model card: MIT, CC-BY-4.0, ...

@@ -4,8 +4,8 @@ use std::io::ErrorKind;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use tercel_study::extended::Aircraft;
-use tercel_train::recipe::Outline;
+use tercel_study::extended::{Aircraft, Held};
+use tercel_train::recipe::{Outline, TestTracks};
 use tercel_train::trainer::{End, Run, Stamp, Summary, Tracks};
 use tercel_train::{TrainError, task};
 
@@ -25,7 +25,7 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
     let run =
         Run { resume: arguments.resume, stamp: stamp(arguments), ..Run::new(target(arguments, &outline)?) };
     let threads = arguments.threads.map_or(run.threads, usize::from);
-    let run = Run { threads, tracks: tracks(arguments)?, ..run };
+    let run = Run { threads, tracks: tracks(arguments, &outline)?, ..run };
     keep_what_is_there(arguments, &run)?;
     let mut observer = Observer::new(console, outline.schedule.epochs);
     let trained = task::train(&text, &run, &mut |progress| {
@@ -38,10 +38,14 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
 }
 
 /// The tracks to learn from: none of those on which the study tests.
-fn tracks(arguments: &TrainArguments) -> Result<Option<Tracks>, Failure> {
+fn tracks(arguments: &TrainArguments, outline: &Outline) -> Result<Option<Tracks>, Failure> {
     let Some(path) = &arguments.data else { return Ok(None) };
     let failed = |error| Failure::Input(Report::of(&error));
-    let aircraft = Aircraft::training(path).map_err(failed)?;
+    let held = match outline.test_tracks() {
+        TestTracks::Last => Held::Last,
+        TestTracks::Random => Held::Random,
+    };
+    let aircraft = Aircraft::training(path, held).map_err(failed)?;
     Ok(Some(Tracks::new(aircraft.tracks().to_vec())))
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::filter::Kalman;
 use crate::motion::{AccelerationNoise, ConstantVelocity, Motion};
 use crate::sensor::{BearingOnly, Position};
 use nalgebra::vector;
@@ -88,4 +89,33 @@ fn too_few_particles_are_refused() {
     let radar = Position::<2>::new(5.0).unwrap();
     assert!(Particle::<_, _, 2>::new(ConstantVelocity::new(1.0), radar, 3, 0).is_err());
     assert!(filter(10).with_threshold(1.5).is_err());
+}
+
+#[test]
+fn a_tentative_cloud_is_small_and_answers_as_a_kalman_filter() {
+    let plain = filter(2_000);
+    let tentative = plain.with_tentative(40).unwrap();
+    let kalman = Kalman::new(plain.motion, plain.sensor);
+    let first = Measurement::from([10.0, 20.0]);
+    let (mut few, mut exact) = (tentative.birth(&first).unwrap(), kalman.birth(&first).unwrap());
+    assert_eq!(few.states().len(), 40);
+    let near = |a: Gaussian<4>, b: Gaussian<4>, share: f64| {
+        (a.mean - b.mean).norm() < share * b.covariance.trace().sqrt()
+            && (a.covariance - b.covariance).norm() < share * b.covariance.norm()
+    };
+    assert!(near(tentative.state(&few), exact, 1e-9));
+    // A copy that is merged with another stays as small.
+    let mut merged = few.clone();
+    tentative.merge(&mut merged, 1.0, &few, 1.0);
+    assert_eq!(merged.states().len(), 40);
+    // Nothing moves by chance over no time, so the moments stay exact.
+    let second = Measurement::from([13.0, 18.0]);
+    let expected = kalman.innovation(&exact, &second).unwrap();
+    let found = tentative.innovation(&few, &second).unwrap();
+    assert!((found.log_likelihood - expected.log_likelihood).abs() < 1e-9);
+    tentative.update(&mut few, &second).unwrap();
+    kalman.update(&mut exact, &second).unwrap();
+    assert_eq!(few.states().len(), 2_000);
+    assert!(near(tentative.state(&few), exact, 0.1));
+    assert!(plain.with_tentative(5).is_err() && plain.with_tentative(2_001).is_err());
 }

@@ -58,7 +58,8 @@ pub struct LiquidMotion {
 /// What the network remembers of one particle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiquidMemory {
-    memory: Vec<f32>,
+    /// Copies of a particle share it until they move.
+    memory: Arc<[f32]>,
     /// The noise of the last step, and that of its position in standard deviations.
     noise: Vector4<f64>,
     surprise: Vector2<f64>,
@@ -113,7 +114,7 @@ impl Sampled<4> for LiquidMotion {
 
     fn start(&self, _: &mut ChaCha8Rng) -> LiquidMemory {
         LiquidMemory {
-            memory: vec![0.0; self.network.memory()],
+            memory: vec![0.0; self.network.memory()].into(),
             noise: Vector4::zeros(),
             surprise: Vector2::zeros(),
             age: 0,
@@ -136,7 +137,7 @@ impl Sampled<4> for LiquidMotion {
         let asked = |memory: &LiquidMemory| memory.age >= hyper.warm_up;
         let count = memories.iter().filter(|memory| asked(memory)).count();
         let objects = states.iter().zip(&*memories).filter(|(_, memory)| asked(memory));
-        let objects = objects.map(|(state, memory)| (memory.seen(state, widths), memory.memory.as_slice()));
+        let objects = objects.map(|(state, memory)| (memory.seen(state, widths), &*memory.memory));
         let mut room = Vec::new();
         let predictions = self.network.predict_means(count, objects, dt, &mut room);
         let mut number = 0;
@@ -146,7 +147,10 @@ impl Sampled<4> for LiquidMotion {
             number += usize::from(asked(memory));
             match said {
                 Some((moved, remembered)) => {
-                    memory.memory.copy_from_slice(remembered);
+                    match Arc::get_mut(&mut memory.memory) {
+                        Some(own) => own.copy_from_slice(remembered),
+                        None => memory.memory = remembered.into(),
+                    }
                     memory.go_on(state, &moved, random);
                 }
                 None => memory.go_on(state, &hyper.form.straight(state, span), random),

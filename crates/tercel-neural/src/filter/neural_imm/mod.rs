@@ -76,10 +76,10 @@ const LABELS: [&str; 4] = ["x", "y", "vx", "vy"];
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct NeuralImm<S> {
+pub struct NeuralImm<S, const M: usize = 2> {
     network: Arc<BankNetwork>,
     bank: TurnBank,
-    filter: Imm<Extended<Turn, S>>,
+    filter: Imm<Extended<Turn, S, M>>,
     origin: Vector2<f64>,
 }
 
@@ -146,7 +146,7 @@ fn deviation(noise: AccelerationNoise) -> f64 {
     }
 }
 
-impl<S: Clone> NeuralImm<S> {
+impl<S: Clone, const M: usize> NeuralImm<S, M> {
     /// A filter of this network for a sensor at the origin, whose accuracy is one of those of `sensors`. Of measurements that
     /// state their accuracy, one sensor is enough.
     ///
@@ -157,9 +157,21 @@ impl<S: Clone> NeuralImm<S> {
         let filter = bank.estimating(sensors)?;
         Ok(NeuralImm { network, bank, filter, origin: Vector2::zeros() })
     }
+
+    /// Sets the standard deviation of a new object's velocity, m/s per axis. That of the training is the default.
+    ///
+    /// # Errors
+    /// Unless it is positive and finite.
+    pub fn with_speed(self, speed: f64) -> Result<Self, FilterError> {
+        let bank = self.bank.with_speed(FilterError::positive("speed of a new object", speed)?);
+        let modes = bank.rates().len() * bank.noises().len();
+        let sensors = self.filter.filters().iter().step_by(modes).map(|filter| filter.sensor.clone());
+        let filter = bank.estimating(&sensors.collect::<Vec<S>>())?;
+        Ok(NeuralImm { bank, filter, ..self })
+    }
 }
 
-impl<S> NeuralImm<S> {
+impl<S, const M: usize> NeuralImm<S, M> {
     /// Says where the sensor stands, m.
     pub fn seen_from(self, origin: Vector2<f64>) -> Self {
         NeuralImm { origin, ..self }
@@ -195,10 +207,7 @@ impl<S> NeuralImm<S> {
     }
 }
 
-impl<S: Sensor<4, 2>> NeuralImm<S>
-where
-    Imm<Extended<Turn, S>>: Filter<4, Belief = ImmBelief<Gaussian<4>, 4>, Measurement = Measurement<2>>,
-{
+impl<S: Sensor<4, M>, const M: usize> NeuralImm<S, M> {
     fn look(&self, belief: &mut NeuralImmBelief) {
         let (modes, state) = (self.filter.mode_probabilities(&belief.bank), self.filter.state(&belief.bank));
         let origin = (!self.network.hyper().heading).then_some(&self.origin);
@@ -210,7 +219,7 @@ where
     fn placed(
         &self,
         belief: &ImmBelief<Gaussian<4>, 4>,
-        measurement: &Measurement<2>,
+        measurement: &Measurement<M>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>, f64), FilterError> {
         let modes = self.filter.mode_probabilities(belief);
         let each = self.bank.rates().len() * self.bank.noises().len();
@@ -233,7 +242,7 @@ where
     fn see(
         &self,
         belief: &mut NeuralImmBelief,
-        measurement: &Measurement<2>,
+        measurement: &Measurement<M>,
         nis: f64,
     ) -> Result<(), FilterError> {
         let (place, noise, unsure) = self.placed(&belief.bank, measurement)?;
@@ -278,11 +287,11 @@ where
     }
 }
 
-impl<S: Sensor<4, 2> + Clone> Filter<4> for NeuralImm<S> {
+impl<S: Sensor<4, M> + Clone, const M: usize> Filter<4> for NeuralImm<S, M> {
     type Belief = NeuralImmBelief;
-    type Measurement = Measurement<2>;
+    type Measurement = Measurement<M>;
 
-    fn birth(&self, measurement: &Measurement<2>) -> Result<NeuralImmBelief, FilterError> {
+    fn birth(&self, measurement: &Measurement<M>) -> Result<NeuralImmBelief, FilterError> {
         let hyper = self.network.hyper();
         let outlook = Outlook::new(hyper.rates.len());
         let mut belief = NeuralImmBelief {
@@ -307,7 +316,7 @@ impl<S: Sensor<4, 2> + Clone> Filter<4> for NeuralImm<S> {
     fn update(
         &self,
         belief: &mut NeuralImmBelief,
-        measurement: &Measurement<2>,
+        measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         let innovation = self.filter.update(&mut belief.bank, measurement)?;
         let NeuralImmBelief { outlook, before, .. } = belief;
@@ -330,7 +339,7 @@ impl<S: Sensor<4, 2> + Clone> Filter<4> for NeuralImm<S> {
     fn innovation(
         &self,
         belief: &NeuralImmBelief,
-        measurement: &Measurement<2>,
+        measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         self.filter.innovation(&belief.bank, measurement)
     }
@@ -380,11 +389,11 @@ impl<S: Sensor<4, 2> + Clone> Filter<4> for NeuralImm<S> {
         self.filter.reach(&belief.bank)
     }
 
-    fn place(&self, measurement: &Measurement<2>) -> Option<Vector2<f64>> {
+    fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {
         self.filter.place(measurement)
     }
 
-    fn area(&self, measurement: &Measurement<2>) -> f64 {
+    fn area(&self, measurement: &Measurement<M>) -> f64 {
         self.filter.area(measurement)
     }
 }

@@ -49,7 +49,14 @@ const PARTICLES: usize = 500;
 pub(super) fn cloud(sensor: &Sensor) -> Result<Particle<JumpMarkov<Turn>, Position<2>>, FilterError> {
     let mode = |(rate, density): (f64, f64)| Turn::new(rate.to_radians(), density).with_speed(SPEED);
     let motion = JumpMarkov::new(BANK.map(mode), Transition::sticky(STAY).per(1.0))?;
-    Particle::new(motion, Position::new(sensor.deviation)?, PARTICLES, 1)?.with_smoothing(0.2)
+    knobs(Particle::new(motion, Position::new(sensor.deviation)?, env("PARTICLES", PARTICLES), 1)?)
+}
+fn env(name: &str, default: usize) -> usize {
+    std::env::var(name).ok().and_then(|x| x.parse().ok()).unwrap_or(default)
+}
+fn knobs<T, S>(p: Particle<T, S>) -> Result<Particle<T, S>, FilterError> {
+    p.with_smoothing(env("SMOOTH", 20) as f64 / 100.0)?
+        .with_tentative(env("TENTATIVE", 500).min(env("PARTICLES", PARTICLES)))
 }
 
 fn network(models: &Models, model: &str) -> Result<Arc<LiquidNetwork>, StudyError> {
@@ -96,7 +103,7 @@ pub(super) fn liquid_cloud(
     let network = network(models, model)?;
     Ok(move |sensor: &Sensor| {
         let motion = LiquidMotion::new(network.clone()).with_speed(SPEED)?;
-        Particle::new(motion, Position::new(sensor.deviation)?, PARTICLES, 1)?.with_smoothing(0.2)
+        knobs(Particle::new(motion, Position::new(sensor.deviation)?, env("PARTICLES", PARTICLES), 1)?)
     })
 }
 

@@ -76,7 +76,7 @@ pub const METHODS: [&str; 29] = [
 /// When there is no such method.
 pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError> {
     use filters::{bank, cloud, published, straight};
-    use trackers::{jpda, jpda_paper, multi_bernoulli, phd, pmbm};
+    use trackers::{jpda, jpda_paper, multi_bernoulli, multi_bernoulli_of_clouds, phd, phd_of_clouds, pmbm};
     let liquid = |model| filters::liquid(models, model);
     let liquid_cloud = |model| filters::liquid_cloud(models, model);
     let neural = || filters::neural(models, "neural-imm-position");
@@ -92,16 +92,21 @@ pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError
         "mlp-phd" => Box::new(Tracked::new(liquid("liquid-mlp")?, phd)),
         "lnn-imm-phd" => Box::new(Tracked::new(liquid_bank()?, phd)),
         "neural-phd" => Box::new(Tracked::new(neural()?, phd)),
-        "smc-imm-phd" => Box::new(Tracked::new(cloud, phd)),
-        "smc-lnn-phd-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, phd)),
-        "smc-lnn-phd" => Box::new(Tracked::new(liquid_cloud("liquid")?, phd)),
+        "smc-imm-phd" => Box::new(Tracked::new(cloud, phd_of_clouds)),
+        "smc-lnn-phd-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, phd_of_clouds)),
+        "smc-lnn-phd" => Box::new(Tracked::new(
+            liquid_cloud(if std::env::var("CFC").is_ok() { "liquid-cfc" } else { "liquid" })?,
+            phd_of_clouds,
+        )),
         "imm-member" => Box::new(Tracked::new(bank, multi_bernoulli)),
         "lnn-member-paper" => Box::new(Tracked::new(liquid("liquid-paper")?, multi_bernoulli)),
         "lnn-member" => Box::new(Tracked::new(liquid("liquid")?, multi_bernoulli)),
         "lnn-imm-member" => Box::new(Tracked::new(liquid_bank()?, multi_bernoulli)),
-        "smc-imm-member" => Box::new(Tracked::new(cloud, multi_bernoulli)),
-        "smc-lnn-member-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, multi_bernoulli)),
-        "smc-lnn-member" => Box::new(Tracked::new(liquid_cloud("liquid")?, multi_bernoulli)),
+        "smc-imm-member" => Box::new(Tracked::new(cloud, multi_bernoulli_of_clouds)),
+        "smc-lnn-member-paper" => {
+            Box::new(Tracked::new(liquid_cloud("liquid-paper")?, multi_bernoulli_of_clouds))
+        }
+        "smc-lnn-member" => Box::new(Tracked::new(liquid_cloud("liquid")?, multi_bernoulli_of_clouds)),
         "imm-jpda-paper" => Box::new(Tracked::new(published, jpda_paper)),
         "imm-jpda" => Box::new(Tracked::new(bank, jpda)),
         "neural-jpda" => Box::new(Tracked::new(neural()?, jpda)),

@@ -83,6 +83,41 @@ pub const AIRCRAFT_METHODS: [&str; 27] = {
 pub const ABLATION: [&str; 6] =
     ["full", "without-prediction", "without-update", "without-memory", "only-update", "only-prediction"];
 
+/// Names of all methods of the study `aircraft-random`: those that learned nothing from tracks, and `rmmnet`, which learned from the
+/// tracks that this study leaves for it.
+pub const RANDOM_METHODS: [&str; 18] = [
+    "centroid",
+    "b-rmm-paper",
+    "vb-rmm-paper",
+    "lan-li-paper",
+    "imm-rmm-paper",
+    "mem-ekf-paper",
+    "mem-rbpf-paper",
+    "b-rmm",
+    "ffk-rmm",
+    "vb-rmm",
+    "lan-li",
+    "imm-rmm",
+    "mem-ekf",
+    "mem-rbpf",
+    "rmmnet",
+    "known-size",
+    "aligned",
+    "aligned-ar",
+];
+
+/// Names of all methods of the study `vehicle-data`: networks, and the best filters without one that know as much and more.
+pub const DATA_METHODS: [&str; 5] = ["vb-rmm", "lstm", "transformer", "rmmnet", "aligned-ar"];
+
+/// From how many vehicles the networks of the study `vehicle-data` learned, with their models: `lstm`, `transformer` and `rmmnet`.
+pub(super) const DATA_MODELS: [(u32, [&str; 3]); 5] = [
+    (100, ["lstm-data-100", "transformer-data-100", "rmmnet-data-100"]),
+    (300, ["lstm-data-300", "transformer-data-300", "rmmnet-data-300"]),
+    (1_000, ["lstm-data-1000", "transformer-data-1000", "rmmnet-data-1000"]),
+    (5_000, ["lstm-data-5000", "transformer-data-5000", "rmmnet-data-5000"]),
+    (20_000, ["lstm-data-20000", "transformer-data-20000", "rmmnet-data-20000"]),
+];
+
 /// The method of that name, with these numbers.
 ///
 /// # Errors
@@ -124,8 +159,11 @@ pub(crate) fn method(
         "aligned-ar" => Box::new(known::Regressive(settings)),
         "oracle" => Box::new(known::Oracle),
         _ => {
-            let known =
-                if study == "vehicle-ablation" { ABLATION.join(", ") } else { VEHICLE_METHODS.join(", ") };
+            let known = match study {
+                "vehicle-ablation" => ABLATION.join(", "),
+                "vehicle-data" => DATA_METHODS.join(", "),
+                _ => VEHICLE_METHODS.join(", "),
+            };
             return Err(StudyError::UnknownMethod { study, name: name.to_owned(), known });
         }
     })

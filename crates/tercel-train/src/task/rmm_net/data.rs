@@ -12,6 +12,7 @@ use super::cost::Truth;
 use super::imitation::imitation;
 use crate::TrainError;
 use crate::check::{positive, refused, size, within};
+use crate::recipe::TestTracks;
 use crate::trainer::{Draw, Split, Tracks};
 
 /// The section `[data]`.
@@ -51,7 +52,7 @@ pub enum Source {
         /// Share of the objects with sizes of their own; the others have the published one.
         #[serde(default)]
         mixed: f64,
-        /// Whether each epoch draws new vehicles.
+        /// Whether each epoch draws new vehicles and scans. Otherwise all epochs learn from one set.
         #[serde(default)]
         fresh: bool,
     },
@@ -68,6 +69,9 @@ pub enum Source {
         /// Learns from simulated tracks instead, each of which moves as a recorded one with so many past velocities.
         #[serde(default)]
         imitated: Option<usize>,
+        /// Those that the program keeps back for a study.
+        #[serde(default)]
+        test: TestTracks,
         /// Takes the tracks where they are, neither moved to the origin nor turned: for what knows its way by heart.
         #[serde(default)]
         fixed: bool,
@@ -207,8 +211,8 @@ impl RmmNetData {
                 let mut rides = crossing.draw(seed, number).rides;
                 Ok(rides.swap_remove((sample % objects) as usize))
             }
-            Source::Vehicles { generators, mixed, fresh } => {
-                let number = if *fresh { sample + ((draw.epoch as u64) << 32) } else { sample };
+            Source::Vehicles { generators, mixed, .. } => {
+                let number = sample + ((draw.epoch as u64) << 32);
                 let generator = generators[sample as usize % generators.len()].generator();
                 let vehicle = Vehicle::new(generator).with_steps(self.steps).map_err(failed)?;
                 // Apart from the random numbers of an epoch: the size belongs to the vehicle.
@@ -217,7 +221,7 @@ impl RmmNetData {
                 let sizes = if own { Sizes::MIXED } else { Sizes::PUBLISHED };
                 Ok(vehicle.with_sizes(sizes).map_err(failed)?.ride(seed, number))
             }
-            Source::Tracks { axes, folds, fold, imitated, fixed } => {
+            Source::Tracks { axes, folds, fold, imitated, fixed, .. } => {
                 let here = |(number, _): &(usize, &Vec<Vector4<f64>>)| {
                     (number % folds == *fold) == (draw.split == Split::Validation)
                 };
@@ -291,6 +295,8 @@ impl Rides {
         draw: Draw<'_>,
     ) -> Result<Self, TrainError> {
         let (members, steps) = (draw.samples.len(), data.steps);
+        let repeated = matches!(data.source, Source::Vehicles { fresh: false, .. });
+        let draw = Draw { epoch: if repeated { 0 } else { draw.epoch }, ..draw };
         let scatterers = data.scatterers()?;
         let scattering = data.scattering()?;
         let mut rides = Rides {
