@@ -1,10 +1,12 @@
 //! The recipes and models of the repository, as the tests of the tasks need them.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use tercel_neural::{Model, shipped};
 
-use crate::trainer::Tracks;
+use super::train;
+use crate::trainer::{Row, Run, Tracks};
 use crate::{ParameterSet, TrainError};
 
 /// The recipes of a kind.
@@ -14,14 +16,23 @@ pub fn recipes(kind: &str) -> Vec<String> {
     texts.filter(|text| crate::recipe::kind(text).unwrap() == kind).collect()
 }
 
-/// Why a recipe that was changed in one place is refused.
-pub fn refusal(
-    recipe: &str,
-    (old, new): (&str, &str),
-    check: impl Fn(&str) -> Result<(), TrainError>,
-) -> String {
-    assert!(recipe.contains(old), "{old}");
-    check(&recipe.replacen(old, new, 1)).unwrap_err().to_string()
+/// A recipe that is changed in one place, old to new, is refused with a message that has the key.
+pub fn refuses(recipe: &str, changes: &[(&str, &str, &str)], check: impl Fn(&str) -> Result<(), TrainError>) {
+    for (old, new, key) in changes {
+        assert!(recipe.contains(old), "{old}");
+        let refusal = check(&recipe.replacen(old, new, 1)).unwrap_err().to_string();
+        assert!(refusal.contains(key), "{new}: {refusal}");
+    }
+}
+
+/// A small training makes this loss smaller, and ends with a model of which a filter can be made.
+pub fn learns(recipe: &str, loss: impl Fn(&Row) -> Option<f64>) {
+    let folder = tempfile::tempdir().unwrap();
+    let run = Run::new(folder.path().join("small.safetensors"));
+    let summary = train(recipe, &run, &mut |_| ControlFlow::Continue(())).unwrap();
+    let losses: Vec<f64> = summary.curve.iter().filter_map(loss).collect();
+    assert!(losses.len() == summary.curve.len() && losses.last() < losses.first(), "{losses:?}");
+    tercel_neural::filter::check(&Model::open(&run.model).unwrap()).unwrap();
 }
 
 fn folder() -> PathBuf {

@@ -118,18 +118,13 @@ fn what_the_filter_adds_is_what_the_loss_takes_off() {
 
 #[test]
 fn a_training_reduces_the_errors() {
-    let folder = tempfile::tempdir().unwrap();
     let text = RECIPE.to_owned() + "[optimiser]\nrate = 1e-2\n[schedule]\nepochs = 4\nbatch = 8\n";
-    let run = Run::new(folder.path().join("small.safetensors"));
-    let summary = train(&text, &run, &mut |_| ControlFlow::Continue(())).unwrap();
-    let losses: Vec<f64> = summary.curve.iter().filter_map(|row| row.loss).collect();
-    assert!(losses.len() == 4 && losses[3] < losses[0], "{losses:?}");
-    tercel_neural::filter::check(&Model::open(&run.model).unwrap()).unwrap();
+    repository::learns(&text, |row| row.loss);
 }
 
 #[test]
 fn impossible_recipes_are_refused_by_key() {
-    for (old, new, key) in [
+    let changes = [
         ("layers = [6, 4]", "layers = []", "layers"),
         ("layers = [6, 4]", "layers = [6, 0]", "layers"),
         ("window = 5", "window = 0", "window"),
@@ -137,11 +132,8 @@ fn impossible_recipes_are_refused_by_key() {
         ("speed = 300.0", "speed = 0.0", "speed"),
         ("speed = 300.0", "speed = 300.0\n[loss]\nposition = -1.0", "loss.position"),
         ("speed = 300.0", "speed = 300.0\n[loss]\nothers = nan", "loss.others"),
-    ] {
-        let check = |text: &str| DeepMttTask::new(&Recipe::parse(text)?).map(drop);
-        let error = repository::refusal(RECIPE, (old, new), check);
-        assert!(error.contains(key), "{error}");
-    }
+    ];
+    repository::refuses(RECIPE, &changes, |text: &str| DeepMttTask::new(&Recipe::parse(text)?).map(drop));
 }
 
 #[test]

@@ -267,7 +267,7 @@ fn the_gradients_of_the_whole_loss_are_its_slopes_where_nothing_counts_as_given(
 #[test]
 fn a_recipe_that_makes_no_sense_is_refused_by_key() {
     let check = |text: &str| RmmNetTask::new(&Recipe::<RmmNetKind>::parse(text)?, None).map(drop);
-    for (old, new, key) in [
+    let changes = [
         ("steps = 1001", "steps = 1", "data.steps"),
         ("points = 12.0", "points = 0.0", "data.points"),
         ("noise = [1.0, 0.64]", "noise = [1.0, -0.64]", "data.noise[1]"),
@@ -279,10 +279,8 @@ fn a_recipe_that_makes_no_sense_is_refused_by_key() {
         ("hidden = 6", "hidden = 6\nchange = -1.0", "change"),
         ("window = 4", "window = 4\nshape = -1.0", "loss.shape"),
         ("interval = 1.0\nmemory", "interval = 2.0\nmemory", "model.interval"),
-    ] {
-        let refusal = repository::refusal(RECIPE, (old, new), check);
-        assert!(refusal.contains(key), "{new}: {refusal}");
-    }
+    ];
+    repository::refuses(RECIPE, &changes, check);
 }
 
 #[test]
