@@ -12,7 +12,7 @@ use tercel_core::extended::{InverseWishart, Points, Scattering};
 use tercel_core::filter::{Estimate, Filter};
 use tercel_neural::filter::extent_net::{Architecture, Frame};
 use tercel_neural::filter::{ExtentNet, ExtentNetBelief, ExtentNetHyper, ExtentNetwork};
-use tercel_neural::{Card, Model, ModelError, Tensor};
+use tercel_neural::{Model, ModelError, Tensor};
 use untrained::{extent_net, small_extent_nets};
 
 fn scattering() -> Scattering {
@@ -156,7 +156,7 @@ fn twenty_thousand_steps_stay_finite_with_and_without_points() {
 #[test]
 fn where_a_network_overflows_the_centroid_is_the_estimate_and_the_next_scan_starts_afresh() {
     for hyper in small_extent_nets(Frame::Residual) {
-        let mut own = tensors(&hyper);
+        let mut own = untrained::tensors(hyper.tensors());
         for (name, tensor) in &mut own {
             match name.as_str() {
                 "memory.bias" | "embed.bias" => tensor.values.fill(10.0),
@@ -196,14 +196,7 @@ fn an_extent_that_is_set_is_the_extent_and_none_is_made_of_what_is_no_matrix() {
 }
 
 fn model(hyper: &ExtentNetHyper, tensors: BTreeMap<String, Tensor>) -> Model {
-    let mut card = Card::new("extent-net", "extent-net", &untrained::STATE);
-    card.hyper = hyper.to_table().unwrap();
-    Model::new(card, tensors).unwrap()
-}
-
-fn tensors(hyper: &ExtentNetHyper) -> BTreeMap<String, Tensor> {
-    let values = |shape: Vec<usize>| Tensor { values: vec![0.1; shape.iter().product()], shape };
-    hyper.tensors().into_iter().map(|(name, shape)| (name, values(shape))).collect()
+    untrained::of_tensors("extent-net", hyper.to_table(), tensors)
 }
 
 fn refusal(model: &Model) -> String {
@@ -213,23 +206,9 @@ fn refusal(model: &Model) -> String {
 #[test]
 fn models_that_do_not_fit_are_refused_by_name() {
     for hyper in small_extent_nets(Frame::Residual) {
-        for (name, tensor) in tensors(&hyper) {
-            let mut wrong = tensors(&hyper);
-            let shape: Vec<usize> = tensor.shape.iter().map(|length| length + 1).collect();
-            let values = vec![0.0; shape.iter().product()];
-            wrong.insert(name.clone(), Tensor { shape, values });
-            assert!(refusal(&model(&hyper, wrong)).contains(&format!("`{name}` has shape")));
-            let mut missing = tensors(&hyper);
-            missing.remove(&name);
-            assert!(refusal(&model(&hyper, missing)).contains(&format!("`{name}` is missing")));
-        }
-        let mut more = tensors(&hyper);
-        more.insert("other".into(), Tensor { shape: vec![1], values: vec![0.0] });
-        assert!(refusal(&model(&hyper, more)).contains("`other`"));
-        assert_eq!(
-            Arc::new(ExtentNetwork::from_model(&model(&hyper, tensors(&hyper))).unwrap()).hyper(),
-            &hyper
-        );
+        untrained::refuses_other_tensors(&hyper.tensors(), |tensors| {
+            ExtentNetwork::from_model(&model(&hyper, tensors))
+        });
     }
 }
 

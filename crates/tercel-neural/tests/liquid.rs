@@ -18,7 +18,7 @@ use tercel_neural::filter::{
     Residual, surprise, widths,
 };
 use tercel_neural::layer::CellShape;
-use tercel_neural::{Card, Model, ModelError, Tensor};
+use tercel_neural::{Model, ModelError, Tensor};
 use untrained::{CELLS, liquid, paper_liquid, small_liquid};
 
 fn filter(hyper: &LiquidHyper, size: f32) -> LiquidKalman<Position<2>> {
@@ -251,7 +251,7 @@ fn what_stands_or_stops_is_predicted() {
 #[test]
 fn a_network_that_overflows_predicts_straight_and_forgets_nothing() {
     let hyper = small_liquid(CELLS[0]);
-    let mut tensors = tensors(&hyper);
+    let mut tensors = untrained::tensors(hyper.tensors());
     tensors.get_mut("output.weight").unwrap().values.fill(f32::MAX);
     tensors.get_mut("output.bias").unwrap().values.fill(f32::MAX);
     let network = Arc::new(LiquidNetwork::from_model(&model(&hyper, tensors)).unwrap());
@@ -308,14 +308,7 @@ fn a_mixture_of_objects_is_followed() {
 }
 
 fn model(hyper: &LiquidHyper, tensors: BTreeMap<String, Tensor>) -> Model {
-    let mut card = Card::new("liquid", "liquid", &untrained::STATE);
-    card.hyper = hyper.to_table().unwrap();
-    Model::new(card, tensors).unwrap()
-}
-
-fn tensors(hyper: &LiquidHyper) -> BTreeMap<String, Tensor> {
-    let zeros = |shape: Vec<usize>| Tensor { values: vec![0.1; shape.iter().product()], shape };
-    hyper.tensors().into_iter().map(|(name, shape)| (name, zeros(shape))).collect()
+    untrained::of_tensors("liquid", hyper.to_table(), tensors)
 }
 
 fn refusal(model: &Model) -> String {
@@ -326,21 +319,10 @@ fn refusal(model: &Model) -> String {
 fn models_that_do_not_fit_are_refused_by_name() {
     for cell in CELLS {
         let hyper = small_liquid(cell);
-        for (name, tensor) in tensors(&hyper) {
-            let mut wrong = tensors(&hyper);
-            let shape: Vec<usize> = tensor.shape.iter().map(|length| length + 1).collect();
-            let values = vec![0.0; shape.iter().product()];
-            wrong.insert(name.clone(), Tensor { shape, values });
-            assert!(refusal(&model(&hyper, wrong)).contains(&format!("`{name}` has shape")));
-            let mut missing = tensors(&hyper);
-            missing.remove(&name);
-            assert!(refusal(&model(&hyper, missing)).contains(&format!("`{name}` is missing")));
-        }
-        LiquidNetwork::from_model(&model(&hyper, tensors(&hyper))).unwrap();
+        untrained::refuses_other_tensors(&hyper.tensors(), |tensors| {
+            LiquidNetwork::from_model(&model(&hyper, tensors))
+        });
     }
-    let mut more = tensors(&small_liquid(CELLS[0]));
-    more.insert("other".into(), Tensor { shape: vec![1], values: vec![0.0] });
-    assert!(refusal(&model(&small_liquid(CELLS[0]), more)).contains("`other`"));
 }
 
 #[test]

@@ -18,7 +18,7 @@ use tercel_core::filter::Filter;
 use tercel_core::motion::{AccelerationNoise, ConstantVelocity};
 use tercel_neural::filter::rmm_net::{Aligned, Blocks, Form, Identification, Published, Transition};
 use tercel_neural::filter::{RmmNet, RmmNetBelief, RmmNetHyper, RmmNetwork};
-use tercel_neural::{Card, Model, ModelError, Tensor};
+use tercel_neural::{Model, ModelError, Tensor};
 use untrained::{rmm_net, small_rmm_net};
 
 /// Round noise, so that no direction differs from another.
@@ -209,7 +209,7 @@ fn scans_that_no_sensor_gives_end_in_a_sound_belief_or_leave_it_as_it_was() {
 #[test]
 fn a_network_that_overflows_says_nothing() {
     let hyper = small_rmm_net();
-    let mut loud = tensors(&hyper);
+    let mut loud = untrained::tensors(hyper.tensors());
     for (name, tensor) in &mut loud {
         if name.contains("output") {
             tensor.values.fill(f32::MAX);
@@ -246,14 +246,7 @@ fn merging_takes_the_mean_of_memories_and_setting_the_state_or_extent_keeps_them
 }
 
 fn model(hyper: &RmmNetHyper, tensors: BTreeMap<String, Tensor>) -> Model {
-    let mut card = Card::new("rmmnet", "rmmnet", &untrained::STATE);
-    card.hyper = hyper.to_table().unwrap();
-    Model::new(card, tensors).unwrap()
-}
-
-fn tensors(hyper: &RmmNetHyper) -> BTreeMap<String, Tensor> {
-    let values = |shape: Vec<usize>| Tensor { values: vec![0.1; shape.iter().product()], shape };
-    hyper.tensors().into_iter().map(|(name, shape)| (name, values(shape))).collect()
+    untrained::of_tensors("rmmnet", hyper.to_table(), tensors)
 }
 
 fn refusal(model: &Model) -> String {
@@ -263,19 +256,9 @@ fn refusal(model: &Model) -> String {
 #[test]
 fn models_that_do_not_fit_are_refused_by_name() {
     let hyper = small_rmm_net();
-    for (name, tensor) in tensors(&hyper) {
-        let mut wrong = tensors(&hyper);
-        let shape: Vec<usize> = tensor.shape.iter().map(|length| length + 1).collect();
-        let values = vec![0.0; shape.iter().product()];
-        wrong.insert(name.clone(), Tensor { shape, values });
-        assert!(refusal(&model(&hyper, wrong)).contains(&format!("`{name}` has shape")));
-        let mut missing = tensors(&hyper);
-        missing.remove(&name);
-        assert!(refusal(&model(&hyper, missing)).contains(&format!("`{name}` is missing")));
-    }
-    let mut more = tensors(&hyper);
-    more.insert("other".into(), Tensor { shape: vec![1], values: vec![0.0] });
-    assert!(refusal(&model(&hyper, more)).contains("`other`"));
+    untrained::refuses_other_tensors(&hyper.tensors(), |tensors| {
+        RmmNetwork::from_model(&model(&hyper, tensors))
+    });
 }
 
 /// As published, in all its variants.

@@ -19,7 +19,7 @@ use tercel_neural::filter::{
     RmmNetHyper, RmmNetwork, Sign, TrMttHyper, TransformerNetwork,
 };
 use tercel_neural::layer::{CellShape, Solver};
-use tercel_neural::{Card, Model, Tensor};
+use tercel_neural::{Card, Model, ModelError, Tensor};
 
 /// The state of all filters here.
 pub const STATE: [&str; 4] = ["x", "y", "vx", "vy"];
@@ -245,4 +245,43 @@ pub fn small_extent_nets(frame: Frame) -> [ExtentNetHyper; 2] {
     let units =
         ExtentNetHyper { frame, position, velocity: 20.0, change: 12.0, speed: 20.0, ..Default::default() };
     architectures.map(|architecture| ExtentNetHyper { architecture, ..units.clone() })
+}
+
+/// A model of some kind with these tensors.
+pub fn of_tensors(
+    kind: &str,
+    hyper: Result<toml::Table, String>,
+    tensors: BTreeMap<String, Tensor>,
+) -> Model {
+    let mut card = Card::new(kind, kind, &STATE);
+    card.hyper = hyper.unwrap();
+    Model::new(card, tensors).unwrap()
+}
+
+/// Tensors of these shapes.
+pub fn tensors(shapes: Vec<(String, Vec<usize>)>) -> BTreeMap<String, Tensor> {
+    let values = |shape: Vec<usize>| Tensor { values: vec![0.1; shape.iter().product()], shape };
+    shapes.into_iter().map(|(name, shape)| (name, values(shape))).collect()
+}
+
+/// Of tensors that make a model, any that is missing, too many or of another shape is refused by its name.
+pub fn refuses_other_tensors<N>(
+    shapes: &[(String, Vec<usize>)],
+    load: impl Fn(BTreeMap<String, Tensor>) -> Result<N, ModelError>,
+) {
+    let all = || tensors(shapes.to_vec());
+    let refusal = |tensors| load(tensors).err().unwrap().to_string();
+    for (name, shape) in shapes {
+        let longer = shape.iter().map(|length| length + 1).collect();
+        let mut wrong = all();
+        wrong.extend(tensors(vec![(name.clone(), longer)]));
+        assert!(refusal(wrong).contains(&format!("`{name}` has shape")));
+        let mut missing = all();
+        missing.remove(name);
+        assert!(refusal(missing).contains(&format!("`{name}` is missing")));
+    }
+    let mut more = all();
+    more.extend(tensors(vec![("other".into(), vec![1])]));
+    assert!(refusal(more).contains("`other`"));
+    load(all()).unwrap();
 }
