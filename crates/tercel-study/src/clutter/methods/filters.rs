@@ -41,22 +41,21 @@ pub(super) fn bank(sensor: &Sensor) -> Result<Imm<Kalman<Turn, Position<2>>>, Fi
     Imm::new(BANK.map(mode), Transition::sticky(STAY).per(1.0))
 }
 
-/// Particles of an object.
+/// Particles of an object, and those before its second measurement.
 const PARTICLES: usize = 500;
+const TENTATIVE: usize = 40;
 
-/// The modes of [`BANK`] with particles that jump between them. The copies of resampling are spread a little, as the noise of
-/// the calm modes is small.
+/// The copies of resampling are spread a little, as the noise of calm modes is small.
+fn particles<T>(motion: T, sensor: &Sensor) -> Result<Particle<T, Position<2>>, FilterError> {
+    let filter = Particle::new(motion, Position::new(sensor.deviation)?, PARTICLES, 1)?;
+    filter.with_smoothing(0.2)?.with_tentative(TENTATIVE)
+}
+
+/// The modes of [`BANK`] with particles that jump between them.
 pub(super) fn cloud(sensor: &Sensor) -> Result<Particle<JumpMarkov<Turn>, Position<2>>, FilterError> {
     let mode = |(rate, density): (f64, f64)| Turn::new(rate.to_radians(), density).with_speed(SPEED);
     let motion = JumpMarkov::new(BANK.map(mode), Transition::sticky(STAY).per(1.0))?;
-    knobs(Particle::new(motion, Position::new(sensor.deviation)?, env("PARTICLES", PARTICLES), 1)?)
-}
-fn env(name: &str, default: usize) -> usize {
-    std::env::var(name).ok().and_then(|x| x.parse().ok()).unwrap_or(default)
-}
-fn knobs<T, S>(p: Particle<T, S>) -> Result<Particle<T, S>, FilterError> {
-    p.with_smoothing(env("SMOOTH", 20) as f64 / 100.0)?
-        .with_tentative(env("TENTATIVE", 500).min(env("PARTICLES", PARTICLES)))
+    particles(motion, sensor)
 }
 
 fn network(models: &Models, model: &str) -> Result<Arc<LiquidNetwork>, StudyError> {
@@ -94,7 +93,7 @@ pub(super) fn wide(
     Ok(move |sensor: &Sensor| bank.filter(Position::new(sensor.deviation)?))
 }
 
-/// The motion of [`liquid`], of particles. The copies of resampling are spread as in [`cloud`].
+/// The motion of [`liquid`], of particles.
 pub(super) fn liquid_cloud(
     models: &Models,
     model: &str,
@@ -103,7 +102,7 @@ pub(super) fn liquid_cloud(
     let network = network(models, model)?;
     Ok(move |sensor: &Sensor| {
         let motion = LiquidMotion::new(network.clone()).with_speed(SPEED)?;
-        knobs(Particle::new(motion, Position::new(sensor.deviation)?, env("PARTICLES", PARTICLES), 1)?)
+        particles(motion, sensor)
     })
 }
 

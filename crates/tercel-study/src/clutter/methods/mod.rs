@@ -11,7 +11,7 @@
 //! | `lnn..-paper` | the same as published: no memory, fixed noise |
 //! | `cfc` | the same with liquid neurons in closed form |
 //! | `gru`, `mlp` | controls of the same size: gated units, and no memory |
-//! | `smc-imm`, `smc-lnn` | the modes of `imm`, and the learned motion, with 500 particles |
+//! | `smc-imm`, `smc-lnn` | the modes of `imm`, and the motion of `cfc` (`-paper`: that of `lnn`), with 500 particles |
 //! | `lnn-imm` | a wide bank of turns whose estimate a liquid network corrects: [`NeuralImm`](tercel_neural::filter::NeuralImm) |
 //! | `neural` | its control: the same with gated units |
 //! | `wide` | that bank without a network |
@@ -76,7 +76,7 @@ pub const METHODS: [&str; 29] = [
 /// When there is no such method.
 pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError> {
     use filters::{bank, cloud, published, straight};
-    use trackers::{jpda, jpda_paper, multi_bernoulli, multi_bernoulli_of_clouds, phd, phd_of_clouds, pmbm};
+    use trackers::{jpda, jpda_paper, multi_bernoulli, phd, pmbm};
     let liquid = |model| filters::liquid(models, model);
     let liquid_cloud = |model| filters::liquid_cloud(models, model);
     let neural = || filters::neural(models, "neural-imm-position");
@@ -92,21 +92,16 @@ pub fn method(name: &str, models: &Models) -> Result<Box<dyn Method>, StudyError
         "mlp-phd" => Box::new(Tracked::new(liquid("liquid-mlp")?, phd)),
         "lnn-imm-phd" => Box::new(Tracked::new(liquid_bank()?, phd)),
         "neural-phd" => Box::new(Tracked::new(neural()?, phd)),
-        "smc-imm-phd" => Box::new(Tracked::new(cloud, phd_of_clouds)),
-        "smc-lnn-phd-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, phd_of_clouds)),
-        "smc-lnn-phd" => Box::new(Tracked::new(
-            liquid_cloud(if std::env::var("CFC").is_ok() { "liquid-cfc" } else { "liquid" })?,
-            phd_of_clouds,
-        )),
+        "smc-imm-phd" => Box::new(Tracked::new(cloud, phd)),
+        "smc-lnn-phd-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, phd)),
+        "smc-lnn-phd" => Box::new(Tracked::new(liquid_cloud("liquid-cfc")?, phd)),
         "imm-member" => Box::new(Tracked::new(bank, multi_bernoulli)),
         "lnn-member-paper" => Box::new(Tracked::new(liquid("liquid-paper")?, multi_bernoulli)),
         "lnn-member" => Box::new(Tracked::new(liquid("liquid")?, multi_bernoulli)),
         "lnn-imm-member" => Box::new(Tracked::new(liquid_bank()?, multi_bernoulli)),
-        "smc-imm-member" => Box::new(Tracked::new(cloud, multi_bernoulli_of_clouds)),
-        "smc-lnn-member-paper" => {
-            Box::new(Tracked::new(liquid_cloud("liquid-paper")?, multi_bernoulli_of_clouds))
-        }
-        "smc-lnn-member" => Box::new(Tracked::new(liquid_cloud("liquid")?, multi_bernoulli_of_clouds)),
+        "smc-imm-member" => Box::new(Tracked::new(cloud, multi_bernoulli)),
+        "smc-lnn-member-paper" => Box::new(Tracked::new(liquid_cloud("liquid-paper")?, multi_bernoulli)),
+        "smc-lnn-member" => Box::new(Tracked::new(liquid_cloud("liquid-cfc")?, multi_bernoulli)),
         "imm-jpda-paper" => Box::new(Tracked::new(published, jpda_paper)),
         "imm-jpda" => Box::new(Tracked::new(bank, jpda)),
         "neural-jpda" => Box::new(Tracked::new(neural()?, jpda)),

@@ -38,31 +38,6 @@ pub(crate) fn phd<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
     })
 }
 
-/// Of clouds, each component of which costs as much as a hundred Gaussians: components that hardly count are given up early.
-pub(crate) fn phd_of_clouds<B>(_: &Recording) -> Result<Phd<B>, FilterError> {
-    Phd::new(PhdConfig {
-        gate: Gate::new(GATE)?,
-        birth: BIRTH,
-        prune: std::env::var("PRUNE").ok().and_then(|x| x.parse().ok()).unwrap_or(1e-5),
-        merge: 4.0,
-        cap: 500,
-        extract: 0.5,
-        management: three_hits(),
-        ..PhdConfig::default()
-    })
-}
-
-pub(crate) fn multi_bernoulli_of_clouds<B>(_: &Recording) -> Result<MultiBernoulli<B>, FilterError> {
-    MultiBernoulli::new(MultiBernoulliConfig {
-        gate: Gate::new(GATE)?,
-        birth: BIRTH,
-        prune: std::env::var("MPRUNE").ok().and_then(|x| x.parse().ok()).unwrap_or(1e-3),
-        beliefs: std::env::var("BELIEFS").ok().and_then(|x| x.parse().ok()).unwrap_or(20),
-        management: three_hits(),
-        ..MultiBernoulliConfig::default()
-    })
-}
-
 pub(crate) fn multi_bernoulli<B>(_: &Recording) -> Result<MultiBernoulli<B>, FilterError> {
     MultiBernoulli::new(MultiBernoulliConfig {
         gate: Gate::new(GATE)?,
