@@ -77,6 +77,10 @@ def command_of(study):
     for option, chosen in sorted(study.get("options", {}).items()):
         if option in ("set", "generator", "sizes") and chosen and chosen not in DEFAULTS[option]:
             command += f" --{option} {chosen}"
+    # Filters with particles are slow, and have a table of fewer runs of their own.
+    methods = [row["method"] for row in study["rows"]]
+    if all(method.startswith("smc-") for method in methods):
+        command += f" --runs {study['runs']} --methods {','.join(methods)}"
     return command
 
 
