@@ -78,60 +78,41 @@ arrays!(Plain, |a: f32, b: f32, c: f32| a * b + c);
 #[cfg(target_arch = "aarch64")]
 arrays!(Fused, f32::mul_add);
 
-/// Machines with AVX2 and FMA, and perhaps more, which compilers use where loops are longer than eight numbers. Every number is
-/// the same on all of them.
+/// AVX2 with FMA.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-macro_rules! eights {
-    ($machine:ty) => {
-        impl Arithmetic for $machine {
-            type Vector = pulp::f32x8;
+impl Arithmetic for pulp::x86::V3 {
+    type Vector = pulp::f32x8;
 
-            #[inline(always)]
-            fn splat(self, x: f32) -> pulp::f32x8 {
-                self.splat_f32x8(x)
-            }
+    #[inline(always)]
+    fn splat(self, x: f32) -> pulp::f32x8 {
+        self.splat_f32x8(x)
+    }
 
-            #[inline(always)]
-            fn gather(self, x: pulp::f32x8, weights: &[f32; LANES], sum: pulp::f32x8) -> pulp::f32x8 {
-                self.mul_add_f32x8(x, pulp::cast(*weights), sum)
-            }
+    #[inline(always)]
+    fn gather(self, x: pulp::f32x8, weights: &[f32; LANES], sum: pulp::f32x8) -> pulp::f32x8 {
+        self.mul_add_f32x8(x, pulp::cast(*weights), sum)
+    }
 
-            #[inline(always)]
-            fn load(self, numbers: &[f32; LANES]) -> pulp::f32x8 {
-                pulp::cast(*numbers)
-            }
+    #[inline(always)]
+    fn load(self, numbers: &[f32; LANES]) -> pulp::f32x8 {
+        pulp::cast(*numbers)
+    }
 
-            #[inline(always)]
-            fn times(self, a: pulp::f32x8, b: pulp::f32x8) -> pulp::f32x8 {
-                self.mul_f32x8(a, b)
-            }
+    #[inline(always)]
+    fn times(self, a: pulp::f32x8, b: pulp::f32x8) -> pulp::f32x8 {
+        self.mul_f32x8(a, b)
+    }
 
-            #[inline(always)]
-            fn numbers(self, vector: pulp::f32x8) -> [f32; LANES] {
-                pulp::cast(vector)
-            }
+    #[inline(always)]
+    fn numbers(self, vector: pulp::f32x8) -> [f32; LANES] {
+        pulp::cast(vector)
+    }
 
-            #[inline(always)]
-            fn fused(a: f32, b: f32, c: f32) -> f32 {
-                a.mul_add(b, c)
-            }
-        }
-
-        impl<K: Kernel> pulp::NullaryFnOnce for Wide<$machine, K> {
-            type Output = ();
-
-            #[inline(always)]
-            fn call(self) {
-                self.1.run(self.0);
-            }
-        }
-    };
+    #[inline(always)]
+    fn fused(a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
+    }
 }
-
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-eights!(pulp::x86::V3);
-#[cfg(target_arch = "x86_64")]
-eights!(pulp::x86::V4);
 
 /// A computation that is compiled once for each kind of machine.
 ///
@@ -140,15 +121,12 @@ pub(crate) trait Kernel {
     fn run<A: Arithmetic>(self, machine: A);
 }
 
-/// Runs a kernel with AVX-512, or AVX2 and FMA, where the machine has them, with NEON on Arm, and plainly elsewhere.
+/// Runs a kernel with AVX2 and FMA where the machine has them, with NEON on Arm, and plainly elsewhere.
 #[inline(always)]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    match pulp::Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        pulp::Arch::V4(simd) => return simd.vectorize(Wide(simd, kernel)),
-        pulp::Arch::V3(simd) => return simd.vectorize(Wide(simd, kernel)),
-        _ => {}
+    if let pulp::Arch::V3(simd) = pulp::Arch::new() {
+        return simd.vectorize(Wide(simd, kernel));
     }
     // NEON and its fused arithmetic are part of every 64-bit Arm machine.
     #[cfg(target_arch = "aarch64")]
@@ -158,7 +136,17 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) {
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-struct Wide<A, K>(A, K);
+struct Wide<K>(pulp::x86::V3, K);
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+impl<K: Kernel> pulp::NullaryFnOnce for Wide<K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.1.run(self.0);
+    }
+}
 
 /// Runs a kernel as a machine without wide vectors does.
 #[cfg(test)]
