@@ -42,6 +42,17 @@ impl Target {
     }
 }
 
+/// Refuses to write over what is read.
+pub fn keep_inputs<'a>(outputs: impl IntoIterator<Item = &'a Path>, inputs: &[&Path]) -> Result<(), Failure> {
+    let same = |one: &Path, other: &Path| matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other);
+    match outputs.into_iter().find(|output| inputs.iter().any(|input| same(output, input))) {
+        Some(path) => {
+            Err(Failure::usage(format!("{}: an output names the same file as an input", path.display())))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Prints text.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();

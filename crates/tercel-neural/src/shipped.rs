@@ -1,6 +1,7 @@
 //! The models that come with Tercel.
 
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::ModelError;
 use crate::model::Model;
@@ -112,6 +113,7 @@ pub fn model(name: &str) -> Result<Model, ModelError> {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Models {
     own: BTreeMap<String, Model>,
+    asked: RefCell<BTreeSet<String>>,
 }
 
 impl Models {
@@ -134,11 +136,17 @@ impl Models {
         self.own.iter().map(|(name, model)| (name.as_str(), model))
     }
 
+    /// Names of the models that were asked for.
+    pub fn asked(&self) -> Vec<String> {
+        self.asked.borrow().iter().cloned().collect()
+    }
+
     /// The model of this name.
     ///
     /// # Errors
     /// As [`model`].
     pub fn get(&self, name: &str) -> Result<Model, ModelError> {
+        self.asked.borrow_mut().insert(name.to_owned());
         self.own.get(name).map_or_else(|| model(name), |own| Ok(own.clone()))
     }
 }

@@ -406,3 +406,24 @@ fn the_speed_of_new_objects_is_the_users() {
     assert!((filter.state(&belief).covariance[(2, 2)] - 49.0).abs() < 1e-9);
     assert!(filter.with_speed(-1.0).is_err());
 }
+
+#[test]
+fn a_long_gap_is_as_many_empty_scans() {
+    for name in ["liquid", "liquid-cfc", "liquid-paper"] {
+        let network =
+            Arc::new(LiquidNetwork::from_model(&tercel_neural::shipped::model(name).unwrap()).unwrap());
+        let filter = LiquidKalman::new(network, Position::<2>::new(5.0).unwrap());
+        let mut belief = filter.birth(&[0.0, 2.0].into()).unwrap();
+        for second in 1..20 {
+            filter.predict(&mut belief, 1.0);
+            filter.update(&mut belief, &[10.0 * f64::from(second), 2.0].into()).unwrap();
+        }
+        let (mut once, mut often) = (belief.clone(), belief.clone());
+        filter.predict(&mut once, 30.0);
+        (0..30).for_each(|_| filter.predict(&mut often, 1.0));
+        assert_eq!(once, often, "{name}");
+        // No time is too long.
+        filter.predict(&mut belief, 1e6);
+        assert!(filter.state(&belief).mean.iter().all(|x| x.is_finite()), "{name}");
+    }
+}

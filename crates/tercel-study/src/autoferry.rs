@@ -4,7 +4,7 @@ mod leave_one_out;
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use tercel_data::table::{Detections, Metric, Metrics, Tracks, Truths};
@@ -15,6 +15,7 @@ use tercel_pipeline::{Config, Pipeline};
 use crate::error::StudyError;
 use crate::evaluate::{EvaluateOptions, Evaluation, evaluate};
 use crate::report::{Picture, Report, Summary};
+use crate::studies::refuse_unused;
 use crate::table::{Figure, Row, StudyTable};
 
 /// Name of the study.
@@ -226,20 +227,24 @@ fn number_of(name: &str) -> u64 {
 ///
 /// `nearest-neighbour`, `phd` and `imm-pmbm` use one shipped configuration for all recordings. A name that ends in `-loo` tunes
 /// that configuration anew for each recording on the others alone: how much of the result is fitted to these few scenes.
-/// `progress` is called with a sentence before each long step.
+/// `models` are files of models that take the place of shipped ones, by the names of those. `progress` is called with a sentence
+/// before each long step.
 ///
 /// # Errors
-/// When a method is not known, or a recording cannot be read or tracked.
+/// When a method is not known, no method uses a model, or a recording cannot be read or tracked.
 pub fn run(
     folder: &Path,
     methods: &[String],
     seed: u64,
+    models: &BTreeMap<String, PathBuf>,
     progress: &dyn Fn(&str),
 ) -> Result<AutoferryResult, StudyError> {
     if let Some(name) = methods.iter().find(|name| !METHODS.contains(&name.as_str())) {
         let known = METHODS.join(", ");
         return Err(StudyError::UnknownMethod { study: NAME, name: name.clone(), known });
     }
+    let used: Vec<String> = methods.iter().filter_map(|method| model_of(method)).map(str::to_owned).collect();
+    refuse_unused(models.keys(), &used)?;
     let recordings = Recording::read_all(folder)?;
     let mut scored = Vec::new();
     for method in methods {
@@ -247,7 +252,7 @@ pub fn run(
         let results: Result<Vec<Scored>, StudyError> = match leave_one_out::Tuned::find(method) {
             Some(tuned) => tuned.leave_one_out(&recordings, progress),
             None => {
-                let config = shipped(method)?;
+                let config = shipped(method, models)?;
                 recordings.iter().map(|recording| recording.score(&config)).collect()
             }
         };
@@ -267,7 +272,7 @@ pub fn run(
 }
 
 /// The shipped configuration of a method.
-fn shipped(method: &str) -> Result<Config, StudyError> {
+fn shipped(method: &str, models: &BTreeMap<String, PathBuf>) -> Result<Config, StudyError> {
     let preset = match method {
         "phd" => "harbour-phd",
         "imm-pmbm" => "harbour-pmbm",
@@ -276,10 +281,20 @@ fn shipped(method: &str) -> Result<Config, StudyError> {
     };
     // The presets are part of the program, and a test reads each.
     let mut config = Config::parse(presets::get(preset).unwrap_or_default())?;
-    if let ("lnn-pmbm", MotionConfig::Learned(motion)) = (method, &mut config.motion) {
-        motion.model = "liquid".to_owned();
+    if let (Some(model), MotionConfig::Learned(motion)) = (model_of(method), &mut config.motion) {
+        let own = models.get(model).map(|file| file.to_string_lossy().into_owned());
+        motion.model = own.unwrap_or_else(|| model.to_owned());
     }
     Ok(config)
+}
+
+/// The model of a method with learned motion.
+fn model_of(method: &str) -> Option<&'static str> {
+    match method {
+        "lnn-pmbm" => Some("liquid"),
+        "lnn-imm-pmbm" => Some("neural-imm-liquid"),
+        _ => None,
+    }
 }
 
 fn row(method: &str, results: &[Scored], seed: u64) -> Row {

@@ -339,7 +339,9 @@ impl Study {
         let chosen_runs = choice.runs.is_some();
         let models = &opened(&choice.models)?;
         let request = Request { set, seed, runs, chosen_runs, methods: &methods, options, data, models };
-        (study.build)(&request)
+        let experiment = (study.build)(&request)?;
+        refuse_unused(choice.models.keys(), &models.asked())?;
+        Ok(experiment)
     }
 }
 
@@ -386,6 +388,18 @@ const MODEL: &str = "model ";
 /// What a plan says of the models that take the place of shipped ones.
 pub(crate) fn options_of(models: &Models) -> impl Iterator<Item = (String, String)> {
     models.replacements().map(|(name, model)| (format!("{MODEL}{name}"), model.file().to_string()))
+}
+
+/// Refuses models that no method uses: figures under their name would be those of others.
+pub(crate) fn refuse_unused<'a>(
+    given: impl IntoIterator<Item = &'a String>,
+    used: &[String],
+) -> Result<(), StudyError> {
+    let Some(name) = given.into_iter().find(|name| !used.contains(name)) else { return Ok(()) };
+    let known = if used.is_empty() { "none".to_owned() } else { used.join(", ") };
+    Err(StudyError::Option(format!(
+        "no chosen method uses the model `{name}`\n  help: the models in use are: {known}"
+    )))
 }
 
 /// The models that come with Tercel, with those of these files in the place of some.

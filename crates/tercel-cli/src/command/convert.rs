@@ -10,7 +10,7 @@ use tercel_data::{AtomicFile, Format, ImportOptions, Imported, write_detections_
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::input::{ReadArguments, is_stdin, note_left_out};
-use crate::output::{STDOUT, Target};
+use crate::output::{STDOUT, Target, keep_inputs};
 use crate::summary::counted;
 
 /// Bring recordings of other programs into the tables.
@@ -93,7 +93,9 @@ impl ConvertArguments {
         if self.input.len() > 1 && self.input.iter().any(|path| is_stdin(path)) {
             return conflict("standard input cannot be joined with files");
         }
-        Ok(())
+        let inputs: Vec<&Path> = self.input.iter().map(PathBuf::as_path).collect();
+        let outputs = [Some(&self.output), self.truth_out.as_ref()].into_iter().flatten();
+        keep_inputs(outputs.filter_map(Target::file), &inputs)
     }
 
     /// Writes the tables; all of them are complete before the first one appears. True when the truth is among them.

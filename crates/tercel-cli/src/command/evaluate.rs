@@ -1,6 +1,6 @@
 //! `tercel evaluate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -11,7 +11,7 @@ use tercel_study::evaluate::Evaluation;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::input;
-use crate::output::{STDOUT, Target, print, print_json};
+use crate::output::{STDOUT, Target, keep_inputs, print, print_json};
 use crate::score::ScoreArguments;
 use crate::summary::Table;
 
@@ -53,6 +53,9 @@ impl EvaluateArguments {
             let message = "--json and -o - both write to standard output";
             return Err(Failure::usage(message));
         }
+        let inputs = [Some(&*self.tracks), Some(&*self.truth), self.scans.as_deref()];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+        keep_inputs(self.output.as_ref().and_then(Target::file), &inputs)?;
         let tracks = read_tracks(&self.tracks, &ReadOptions::default())?;
         let truths = input::truth(&self.truth)?;
         let times = match &self.scans {

@@ -224,7 +224,6 @@ impl StudyArguments {
             ("--sizes", self.sizes.is_some()),
             ("--shard", self.shard.is_some()),
             ("--threads", self.threads.is_some()),
-            ("--model", !self.models.is_empty()),
         ];
         if let Some((option, _)) = drawn.iter().find(|(_, given)| *given) {
             let message = format!(
@@ -235,7 +234,8 @@ impl StudyArguments {
         }
         let folder = self.data.clone().unwrap_or_else(|| RECORDINGS.into());
         let methods = study.methods(self.methods.as_deref())?;
-        let result = autoferry::run(&folder, &methods, 0, &|what| console.note(what))?;
+        let models = self.models.iter().cloned().collect();
+        let result = autoferry::run(&folder, &methods, 0, &models, &|what| console.note(what))?;
         if let Some(folder) = &self.output {
             result.write(folder)?;
             let files = "tracks, metrics.csv, study.json and report.html";

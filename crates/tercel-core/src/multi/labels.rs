@@ -79,13 +79,13 @@ impl<B: Clone> Roster<B> {
     /// Reads the tracks off terms that are sorted by falling weight. Terms of one label that lie together are one object:
     /// its existence is the sum of their weights, its belief their merger, and it was seen when the sum reaches
     /// `extract`. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
-    /// a track is marked; the others count as clutter.
+    /// a track is marked; the others count as clutter. A track that is gone is reported where it would be now, after a time `dt`.
     pub fn read<const N: usize, F>(
         &mut self,
         filter: &F,
         terms: &mut [Labelled<B>],
         measurements: usize,
-        (extract, time, management): (f64, f64, &Management),
+        (extract, (dt, time), management): (f64, (f64, f64), &Management),
     ) where
         F: Filter<N, Belief = B> + ?Sized,
     {
@@ -108,6 +108,9 @@ impl<B: Clone> Roster<B> {
             }
         }
         for track in &mut self.tracks {
+            if track.existence == 0.0 {
+                filter.predict(&mut track.belief, dt);
+            }
             management.judge(track, time);
         }
         self.uses.clear();

@@ -256,7 +256,7 @@ impl<B: Clone> MultiBernoulli<B> {
     }
 
     /// Reads the tracks off the objects. A label that management gave up takes its objects with it.
-    fn label<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
+    fn label<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>, dt: f64)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
@@ -270,7 +270,7 @@ impl<B: Clone> MultiBernoulli<B> {
             Term { weight: object.existence, belief, tag: object.label }
         };
         let mut terms: Vec<Term<B, Label>> = self.objects.iter().map(whole).collect();
-        let rule = (self.config.extract, scan.time, &self.config.management);
+        let rule = (self.config.extract, (dt, scan.time), &self.config.management);
         self.roster.read(filter, &mut terms, scan.measurements.len(), rule);
         for (object, term) in self.objects.iter_mut().zip(&terms) {
             object.label = term.tag;
@@ -340,7 +340,7 @@ impl<B: Clone> Tracker for MultiBernoulli<B> {
         self.predict(filter, dt);
         self.contribute(filter, scan);
         self.collect(filter);
-        self.label(filter, scan);
+        self.label(filter, scan, dt);
         self.birth(filter, scan);
         self.time = Some(scan.time);
         Ok(())

@@ -197,11 +197,11 @@ impl<B: Clone> Phd<B> {
     }
 
     /// Reads the tracks off the terms. A label that management gave up takes its terms with it.
-    fn label<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
+    fn label<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>, dt: f64)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let rule = (self.config.extract, scan.time, &self.config.management);
+        let rule = (self.config.extract, (dt, scan.time), &self.config.management);
         self.roster.read(filter, &mut self.terms, scan.measurements.len(), rule);
         let roster = &self.roster;
         self.terms.retain(|term| roster.lives(term.tag.id));
@@ -248,7 +248,7 @@ impl<B: Clone> Tracker for Phd<B> {
         self.update(filter, scan);
         let (merge, cap) = (self.config.merge, self.config.cap);
         self.scratch.reduction.reduce(filter, &mut self.terms, merge, cap);
-        self.label(filter, scan);
+        self.label(filter, scan, dt);
         self.birth(filter, scan);
         self.time = Some(scan.time);
         Ok(())

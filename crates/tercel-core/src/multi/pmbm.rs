@@ -190,8 +190,9 @@ impl<B: Clone> Pmbm<B> {
         self.undetected.predict(dt);
     }
 
-    /// Reads the tracks off the trees; those that management gives up take their trees with them.
-    fn read<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
+    /// Reads the tracks off the trees; those that management gives up take their trees with them. A track of which nothing is left
+    /// is reported where it would be now.
+    fn read<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>, dt: f64)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
@@ -203,7 +204,13 @@ impl<B: Clone> Pmbm<B> {
             for (number, tree) in cluster.trees.iter().enumerate() {
                 let summary = cluster.summary(filter, number);
                 match self.tracks.binary_search_by_key(&tree.label, |track| track.id) {
-                    Ok(at) => summary.show(&mut self.tracks[at], scan.time),
+                    Ok(at) => {
+                        let track = &mut self.tracks[at];
+                        if summary.is_gone() {
+                            filter.predict(&mut track.belief, dt);
+                        }
+                        summary.show(track, scan.time);
+                    }
                     Err(_) => fresh.extend(summary.start(tree.label, scan.time)),
                 }
             }
@@ -264,7 +271,7 @@ impl<B: Clone> Tracker for Pmbm<B> {
         self.predict(filter, dt);
         self.update(filter, scan, &places);
         self.undetected.seen(scan.detection);
-        self.read(filter, scan);
+        self.read(filter, scan, dt);
         self.time = Some(scan.time);
         Ok(())
     }

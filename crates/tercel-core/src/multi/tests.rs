@@ -305,6 +305,28 @@ fn an_outage_is_survived_by_memory_and_a_thousand_births_a_scan_by_the_caps() {
     }
 }
 
+#[test]
+fn a_track_that_is_given_up_after_a_gap_is_reported_where_it_would_be_by_then() {
+    fn check<T: Tracker<Belief = Gaussian<4>>>(name: &str, mut tracker: T) {
+        let (filter, scene) = (filter(), scene());
+        for second in 0..10 {
+            let plots: Plots = vec![[10.0 * f64::from(second), 50.0].into()];
+            tracker.step(&filter, &scan(f64::from(second), &plots, &scene)).unwrap();
+        }
+        assert_eq!(tracker.tracks().len(), 1, "{name}");
+        tracker.step(&filter, &scan(1009.0, &Plots::new(), &scene)).unwrap();
+        for track in tracker.tracks() {
+            assert!((track.belief.mean[0] - 10_090.0).abs() < 1_000.0, "{name}: {}", track.belief.mean);
+            assert!(track.existence.is_sign_positive(), "{name}");
+        }
+    }
+    check("nearest neighbour", NearestNeighbour::new(NearestNeighbourConfig::default()).unwrap());
+    check("jpda", Jpda::new(JpdaConfig::default()).unwrap());
+    check("phd", Phd::new(PhdConfig::default()).unwrap());
+    check("multi-Bernoulli", MultiBernoulli::new(MultiBernoulliConfig::default()).unwrap());
+    check("pmbm", Pmbm::new(PmbmConfig::default()).unwrap());
+}
+
 proptest! {
     #[test]
     fn any_scans_leave_finite_tracks(

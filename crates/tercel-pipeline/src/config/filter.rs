@@ -53,7 +53,7 @@ impl FilterConfig {
                 );
                 Err(PipelineError::config("filter.estimator", &reason))
             }
-            (Estimator::Kalman | Estimator::Unscented | Estimator::Particle, _)
+            (Estimator::Kalman | Estimator::Extended | Estimator::Unscented | Estimator::Particle, _)
                 if matches!(motion, MotionConfig::Learned(_)) =>
             {
                 Err(PipelineError::config(

@@ -17,7 +17,7 @@ use super::config;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::input::{self, ReadArguments, STDIN, is_stdin, note_left_out};
-use crate::output::Target;
+use crate::output::{Target, keep_inputs};
 use crate::progress::Progress;
 use crate::score::ScoreArguments;
 
@@ -112,9 +112,9 @@ impl TrackArguments {
         if tracks.is_some() && tracks == self.report.as_deref() {
             return conflict("-o and --report name the same file");
         }
-        if [tracks, self.report.as_deref()].into_iter().flatten().any(|path| is_same(path, &self.input)) {
-            return conflict("an output names the same file as the input");
-        }
+        let inputs = [Some(&*self.input), self.truth.as_deref(), self.config.as_deref()];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+        keep_inputs([tracks, self.report.as_deref()].into_iter().flatten(), &inputs)?;
         // Found now rather than after hours of tracking.
         let Some(folder) = self.report.as_deref().and_then(Path::parent) else { return Ok(()) };
         if !folder.as_os_str().is_empty() && !folder.is_dir() {
@@ -231,9 +231,4 @@ impl TrackArguments {
         let file = if is_stdin(&self.input) { STDIN.into() } else { self.input.to_string_lossy() };
         Failure::from(error).found_in(&file)
     }
-}
-
-/// True when two paths lead to one file that is there.
-fn is_same(one: &Path, other: &Path) -> bool {
-    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }

@@ -26,6 +26,9 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
         Run { resume: arguments.resume, stamp: stamp(arguments), ..Run::new(target(arguments, &outline)?) };
     let threads = arguments.threads.map_or(run.threads, usize::from);
     let run = Run { threads, tracks: tracks(arguments, &outline)?, ..run };
+    let written = [run.model.with_extension("toml"), run.curve(), run.checkpoint(), run.model.clone()];
+    // The card is named as the model, and may be named as the recipe.
+    output::keep_inputs(written.iter().map(PathBuf::as_path), &[arguments.recipe.as_path()])?;
     keep_what_is_there(arguments, &run)?;
     let mut observer = Observer::new(console, outline.schedule.epochs);
     let trained = task::train(&text, &run, &mut |progress| {
@@ -49,17 +52,26 @@ fn tracks(arguments: &TrainArguments, outline: &Outline) -> Result<Option<Tracks
     Ok(Some(Tracks::new(aircraft.tracks().to_vec())))
 }
 
-/// Where the model goes. Only the folder that nobody named is made.
+/// Where the model goes; its folder is made.
 fn target(arguments: &TrainArguments, outline: &Outline) -> Result<PathBuf, Failure> {
     if let Some(path) = &arguments.output {
         return match path.extension().and_then(|ending| ending.to_str()) {
-            Some("safetensors") => Ok(path.clone()),
+            Some("safetensors") => {
+                if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+                    make_folder(folder)?;
+                }
+                Ok(path.clone())
+            }
             _ => Err(Failure::usage("the name of a model must end in .safetensors")),
         };
     }
-    std::fs::create_dir_all(FOLDER)
-        .map_err(|error| Failure::failed(format!("{FOLDER}: cannot create: {error}")))?;
+    make_folder(Path::new(FOLDER))?;
     Ok(Path::new(FOLDER).join(format!("{}.safetensors", outline.name)))
+}
+
+fn make_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::failed(format!("{}: cannot create: {error}", folder.display())))
 }
 
 /// Refuses to train over what took hours, unless asked to.

@@ -112,7 +112,7 @@ impl<B> Cluster<B> {
         let leaves = || {
             self.trees[tree].leaves.iter().zip(&shares).map(|(leaf, share)| (leaf, share * leaf.existence))
         };
-        let existence: f64 = leaves().map(|(_, part)| part).sum();
+        let existence = leaves().map(|(_, part)| part).fold(0.0, |sum, part| sum + part);
         let mut belief: Option<B> = None;
         let (mut weight, mut seen) = (0.0, 0.0);
         let mut heaviest = (0.0, None);
@@ -137,6 +137,11 @@ impl<B> Cluster<B> {
 }
 
 impl<B> Summary<B> {
+    /// Whether no hypothesis knows of the object.
+    pub fn is_gone(&self) -> bool {
+        self.belief.is_none()
+    }
+
     /// Updates the track of the tree.
     pub fn show(self, track: &mut Track<B>, time: f64) {
         track.existence = self.existence;

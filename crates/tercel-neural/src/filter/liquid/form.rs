@@ -161,6 +161,30 @@ impl Span {
     }
 }
 
+/// A time as a network takes it that has learned one interval: in steps of about that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cut {
+    pub steps: u32,
+    /// Time of a step, s.
+    pub each: f64,
+    /// What is left after the most steps that are taken, s.
+    pub rest: f64,
+}
+
+/// Most steps of a prediction: nobody knows where a manoeuvring object is after as many, and time must end.
+const MOST: f64 = 300.0;
+
+impl Cut {
+    pub fn new(dt: f64, interval: f64) -> Self {
+        match (dt / interval).round() {
+            _ if dt == 0.0 => Cut { steps: 0, each: 0.0, rest: 0.0 },
+            count if count > MOST => Cut { steps: MOST as u32, each: interval, rest: dt - MOST * interval },
+            count if count > 1.0 => Cut { steps: count as u32, each: dt / count, rest: 0.0 },
+            _ => Cut { steps: 1, each: dt, rest: 0.0 },
+        }
+    }
+}
+
 /// Speed below which there is no heading, m/s.
 const STANDING: f64 = 1.0;
 

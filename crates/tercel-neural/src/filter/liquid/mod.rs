@@ -16,6 +16,7 @@ use tercel_core::sensor::{Measurement, Sensor};
 
 use super::memory::share;
 
+use form::Cut;
 pub use form::{Absolute, Form, Moved, Residual, Seen, Span, surprise, widths};
 pub use hyper::{Derivative, LiquidHyper};
 pub use motion::{LiquidMemory, LiquidMotion};
@@ -37,7 +38,8 @@ pub(super) const KIND: &str = "liquid";
 /// The network does not see the position, so it predicts alike everywhere. `J` comes from derivatives that are carried through
 /// the solver of the network, or from differences. The first steps after a birth are straight, since there is no velocity yet;
 /// so is what the network says nothing finite of. A missing measurement is a prediction after which nothing was corrected. Over
-/// no time there is no step.
+/// no time there is no step. A longer time than that of the training is cut into steps of about that time, up to 300; what is
+/// left after these is straight.
 ///
 /// Mixing ([`set_state`](Filter::set_state)) moves the state and leaves the memory; merging takes the mean of memories.
 /// [`predict_all`](Filter::predict_all) asks the network once for all objects, and gives the same bits as one by one.
@@ -173,11 +175,21 @@ impl<S, const M: usize> LiquidKalman<S, M> {
         Extended::new(self.motion(), &self.sensor)
     }
 
-    /// Moves beliefs forward: the young ones straight, the others by one call of the network.
+    /// Moves beliefs forward, in steps of the time that the network has learned.
     fn advance(&self, beliefs: &mut [&mut LiquidBelief], dt: f64, room: &mut Vec<f32>) {
-        if dt == 0.0 {
-            return;
+        let LiquidHyper { interval, form, .. } = self.network.hyper();
+        let cut = Cut::new(dt, *interval);
+        for _ in 0..cut.steps {
+            self.step(beliefs, cut.each, room);
         }
+        if cut.rest > 0.0 {
+            let span = Span { dt: cut.rest, interval: *interval };
+            beliefs.iter_mut().for_each(|belief| belief.go_on(&form.straight(&belief.state.mean, span)));
+        }
+    }
+
+    /// Moves beliefs forward: the young ones straight, the others by one call of the network.
+    fn step(&self, beliefs: &mut [&mut LiquidBelief], dt: f64, room: &mut Vec<f32>) {
         let hyper = self.network.hyper();
         let span = Span { dt, interval: hyper.interval };
         let asked = |belief: &&mut LiquidBelief| belief.age >= hyper.warm_up;

@@ -9,7 +9,8 @@ use tercel_core::belief::{Cholesky, Gaussian};
 use tercel_core::error::FilterError;
 use tercel_core::motion::{ConstantVelocity, Motion, Sampled};
 
-use super::form::{Moved, Seen, Span, widths};
+use super::form::{Cut, Moved, Seen, Span, widths};
+use super::hyper::LiquidHyper;
 use super::network::LiquidNetwork;
 
 /// The learned motion of a [`LiquidKalman`](super::LiquidKalman), drawn particle by particle.
@@ -128,9 +129,29 @@ impl Sampled<4> for LiquidMotion {
         dt: f64,
         random: &mut ChaCha8Rng,
     ) {
-        if dt == 0.0 {
-            return;
+        let LiquidHyper { interval, form, .. } = self.network.hyper();
+        let cut = Cut::new(dt, *interval);
+        for _ in 0..cut.steps {
+            self.step(states, memories, cut.each, random);
         }
+        if cut.rest > 0.0 {
+            let span = Span { dt: cut.rest, interval: *interval };
+            for (state, memory) in states.iter_mut().zip(memories) {
+                memory.go_on(state, &form.straight(state, span), random);
+            }
+        }
+    }
+}
+
+impl LiquidMotion {
+    /// A step of the time that the network has learned, or near it.
+    fn step(
+        &self,
+        states: &mut [Vector4<f64>],
+        memories: &mut [LiquidMemory],
+        dt: f64,
+        random: &mut ChaCha8Rng,
+    ) {
         let hyper = self.network.hyper();
         let span = Span { dt, interval: hyper.interval };
         let widths = widths(&cloud(states));
