@@ -6,9 +6,7 @@ use tercel_core::filter::{Filter, Transition};
 use tercel_core::motion::{
     ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Motion, RandomWalk, Singer, Turn,
 };
-use tercel_core::multi::{
-    self, Jpda, MultiBernoulli, NearestNeighbour, Phd, Pmbm, Tracker, TrackerError, Use,
-};
+use tercel_core::multi::{self, Jpda, MultiBernoulli, NearestNeighbour, Phd, Pmbm, Tracker, Use};
 use tercel_core::sensor::{Measurement, Sensor};
 use tercel_data::table::{self, Scan};
 
@@ -133,14 +131,12 @@ where
         measurements: &[Measurement<M>],
     ) -> Result<Outcome, PipelineError> {
         let tracker = &mut self.tracker;
-        let stepped = self
-            .recursion
+        self.recursion
             .with(sensor, |filter| {
                 let numbers: Vec<usize> = (0..measurements.len()).collect();
                 follow(tracker, &Numbered { filter, measurements }, station, scan, &numbers)
             })
-            .map_err(|error| PipelineError::parameter("motion", &error))?;
-        stepped.map_err(|source| PipelineError::Tracker { sensor: scan.sensor.to_string(), source })
+            .map_err(|error| PipelineError::parameter("motion", &error))?
     }
 }
 
@@ -151,7 +147,7 @@ fn follow<T: Tracker, const N: usize>(
     station: &Station,
     scan: &Scan,
     numbers: &[usize],
-) -> Result<Outcome, TrackerError> {
+) -> Result<Outcome, PipelineError> {
     let detection = station.detection();
     let seen = multi::Scan {
         time: scan.time,
@@ -159,10 +155,11 @@ fn follow<T: Tracker, const N: usize>(
         detection: &detection,
         clutter: &station.clutter,
     };
-    tracker.step(filter, &seen)?;
+    let refused = |source| PipelineError::Tracker { sensor: scan.sensor.to_string(), source };
+    tracker.step(filter, &seen).map_err(refused)?;
     let places = numbers.iter().map(|number| filter.place(number));
     let uses = places.zip(tracker.uses().iter().copied()).collect();
-    Ok(Outcome { rows: rows(filter, tracker.tracks(), scan), uses })
+    Ok(Outcome { rows: rows(filter, tracker.tracks(), scan)?, uses })
 }
 
 impl<R, T, const N: usize> Engine for Runner<R, T, N>
@@ -190,11 +187,14 @@ fn rows<const N: usize, B: Clone>(
     filter: &dyn Filter<N, Belief = B, Measurement = usize>,
     tracks: &[multi::Track<B>],
     scan: &Scan,
-) -> Vec<table::Track> {
+) -> Result<Vec<table::Track>, PipelineError> {
     let row = |track: &multi::Track<B>| {
         let estimate = filter.estimate(&track.belief);
+        if !estimate.mean.iter().chain(&estimate.covariance).all(|number| number.is_finite()) {
+            return Err(PipelineError::Estimate { time: scan.time, track: track.id });
+        }
         let upper = (0..N).flat_map(|i| (i..N).map(move |j| (i, j)));
-        table::Track {
+        Ok(table::Track {
             time: scan.time,
             sensor: scan.sensor.clone(),
             track: track.id,
@@ -205,7 +205,7 @@ fn rows<const N: usize, B: Clone>(
             modes: estimate.modes,
             extent: None,
             detection: track.measurement.map(|number| scan.detections[number].id),
-        }
+        })
     };
     tracks.iter().map(row).collect()
 }

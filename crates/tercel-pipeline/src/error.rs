@@ -42,6 +42,16 @@ pub enum PipelineError {
         /// What would help.
         help: String,
     },
+    /// What a track says is not finite: its numbers have become too large.
+    #[error(
+        "track {track} at {time} s has a state that is not finite\n  help: are the times in seconds, and the measurements in metres?"
+    )]
+    Estimate {
+        /// Time of the scan, s.
+        time: f64,
+        /// Number of the track.
+        track: u64,
+    },
     /// The tracker refused a scan.
     #[error("sensor `{sensor}`: {source}")]
     Tracker {

@@ -6,7 +6,7 @@ fn folder() -> std::path::PathBuf {
 
 #[test]
 fn the_shipped_configuration_keeps_its_level() {
-    let result = run(&folder(), &["nearest-neighbour".to_string()], 1, &|_| {}).unwrap();
+    let result = run(&folder(), &["nearest-neighbour".to_string()], 1, &BTreeMap::new(), &|_| {}).unwrap();
     let row = &result.table.rows[0];
     let mean = |name: &str| row.metrics[name].mean;
     assert!(mean("covered") >= 0.94, "{}", mean("covered"));
@@ -17,7 +17,7 @@ fn the_shipped_configuration_keeps_its_level() {
 
 #[test]
 fn the_shipped_mixture_of_hypotheses_keeps_its_level() {
-    let result = run(&folder(), &["imm-pmbm".to_string()], 1, &|_| {}).unwrap();
+    let result = run(&folder(), &["imm-pmbm".to_string()], 1, &BTreeMap::new(), &|_| {}).unwrap();
     let row = &result.table.rows[0];
     let mean = |name: &str| row.metrics[name].mean;
     assert!(mean("covered") >= 0.94, "{}", mean("covered"));
@@ -63,7 +63,7 @@ fn scores_agree_with_an_independent_scorer() {
 
 #[test]
 fn an_unknown_method_lists_the_known_ones() {
-    let error = run(&folder(), &["magic".to_string()], 1, &|_| {}).unwrap_err().to_string();
+    let error = run(&folder(), &["magic".to_string()], 1, &BTreeMap::new(), &|_| {}).unwrap_err().to_string();
     assert!(error.contains("`magic`") && error.contains("phd"), "{error}");
 }
 
