@@ -29,7 +29,7 @@ pub(super) fn draw(
         }));
         tracks.push(((*name).to_owned(), table));
     }
-    let mut picture = Picture::new(&without_radar(&detections), &all, Some(&truths), &[])?;
+    let mut picture = Picture::new(&without_radar(&detections), &all, Some(&truths), &[])?.without_counts();
     for (number, (name, _)) in (1..).zip(followed) {
         picture = picture.with_track_name(number, *name);
     }

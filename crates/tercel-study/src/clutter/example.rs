@@ -32,7 +32,7 @@ pub(super) fn draw(
         tracks.push(((*name).to_owned(), tables::tracks(recording, reported, 0)));
     }
     all.rows.sort_by(|a, b| a.time.total_cmp(&b.time));
-    let mut picture = Picture::new(&detections, &all, Some(&truths), &[])?;
+    let mut picture = Picture::new(&detections, &all, Some(&truths), &[])?.without_counts();
     for (track, name) in names {
         picture = picture.with_track_name(track, name);
     }

@@ -30,8 +30,9 @@ pub(super) fn draw(
         all.extend(rows.iter().cloned());
         own.push(((*name).to_owned(), tables::tracks(rows)));
     }
-    let mut picture =
-        Picture::new(&detections, &tables::tracks(all), Some(&truths), &[])?.with_track_name(0, "truth");
+    let mut picture = Picture::new(&detections, &tables::tracks(all), Some(&truths), &[])?
+        .without_counts()
+        .with_track_name(0, "truth");
     for (number, (name, _)) in (1..).zip(followed) {
         picture = picture.with_track_name(number, *name);
     }

@@ -41,7 +41,7 @@ pub(super) fn draw(
         own.push(((*name).to_owned(), tables::tracks(rows(reports, 0))));
     }
     all.sort_by(|a, b| a.time.total_cmp(&b.time));
-    let mut picture = Picture::new(&detections, &tables::tracks(all), Some(&truths), &[])?;
+    let mut picture = Picture::new(&detections, &tables::tracks(all), Some(&truths), &[])?.without_counts();
     for (track, name) in names {
         picture = picture.with_track_name(track, name);
     }

@@ -116,6 +116,11 @@ impl Picture {
         self
     }
 
+    /// Leaves out the chart that counts tracks, where these are of several trackers.
+    pub fn without_counts(self) -> Picture {
+        Picture { counts: None, ..self }
+    }
+
     /// Adds a chart over the time of the recording. A line marks the time of the slider, and a click moves it.
     pub fn with_chart(mut self, chart: Chart) -> Picture {
         self.charts.push(chart);
@@ -177,8 +182,10 @@ fn count_chart(times: &[f64], tracks: &Tracks, truths: Option<&Truths>) -> Chart
     }
     let chart = Chart::over_time("Number of tracks", "", times.to_vec())
         .with_form(Form::Steps)
-        .with_part("confirmed tracks", confirmed)
-        .with_part("tentative tracks", tentative);
+        .with_part("confirmed tracks", confirmed);
+    // Tables often hold confirmed tracks alone.
+    let any = tentative.iter().any(|count| *count > 0.0);
+    let chart = if any { chart.with_part("tentative tracks", tentative) } else { chart };
     match truths {
         Some(truths) => chart.with_part("true objects", count_objects(times, truths)),
         None => chart,
