@@ -29,6 +29,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// `1 run`, `40 runs`.
+    pub(crate) fn counted_runs(&self) -> String {
+        format!("{} run{}", self.runs, if self.runs == 1 { "" } else { "s" })
+    }
+
     /// In what two plans differ, in words: the first such thing.
     pub fn difference(&self, other: &Plan) -> Option<String> {
         let list = |options: &BTreeMap<String, String>| {

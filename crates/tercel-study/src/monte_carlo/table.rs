@@ -99,14 +99,14 @@ impl Results {
         let options: Vec<String> =
             plan.options.iter().map(|(name, value)| format!(", {name} {value}")).collect();
         let mut text = format!(
-            "study {}{}, seed {}, {} runs\n",
+            "study {}{}, seed {}, {}\n",
             plan.study,
             options.concat(),
             plan.seed,
             if plan.sweep.is_some() {
-                format!("{} x {}", plan.conditions(), plan.runs)
+                format!("{} x {}", plan.conditions(), plan.counted_runs())
             } else {
-                plan.runs.to_string()
+                plan.counted_runs()
             },
         );
         match &plan.sweep {

@@ -82,9 +82,9 @@ impl Results {
             plan.options.iter().map(|(name, value)| format!(", {name} {value}")).collect();
         let mut report = Report::new(format!("Study {}{}", plan.study, options.concat()))
             .with_subtitle(format!(
-                "Seed {}, {} runs{}. Intervals hold the mean with 95 % (bootstrap).",
+                "Seed {}, {}{}. Intervals hold the mean with 95 % (bootstrap).",
                 plan.seed,
-                plan.runs,
+                plan.counted_runs(),
                 if plan.sweep.is_some() { " under each condition" } else { "" }
             ))
             .with(self.summary(table));
