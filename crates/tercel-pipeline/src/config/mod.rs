@@ -79,7 +79,8 @@ impl Config {
     /// When the text is not TOML, a key is unknown or missing, or a value lies outside its range. The message points at the
     /// line and the column.
     pub fn parse(text: &str) -> Result<Self, PipelineError> {
-        let config: Config = toml::from_str(text).map_err(|error| PipelineError::Syntax(Box::new(error)))?;
+        let refused = |error| several_motions(text).unwrap_or(PipelineError::Syntax(Box::new(error)));
+        let config: Config = toml::from_str(text).map_err(refused)?;
         config.check()?;
         Ok(config)
     }
@@ -119,6 +120,19 @@ impl Config {
         }
         self.filter.check(&self.motion, &self.sensors)
     }
+}
+
+/// What is wrong with a motion section that holds none or several, which the parser would not say so plainly.
+fn several_motions(text: &str) -> Option<PipelineError> {
+    let table: toml::Table = text.parse().ok()?;
+    let motions: Vec<&str> = table.get("motion")?.as_table()?.keys().map(String::as_str).collect();
+    let found = match motions[..] {
+        [_] => return None,
+        [] => "it is empty".to_owned(),
+        _ => format!("it holds {}", motions.join(", ")),
+    };
+    let reason = format!("there must be exactly one motion, such as constant_velocity; {found}");
+    Some(PipelineError::config("motion", &reason))
 }
 
 #[cfg(test)]

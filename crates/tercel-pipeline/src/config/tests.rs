@@ -37,6 +37,18 @@ fn an_unknown_key_is_named_with_its_line() {
 }
 
 #[test]
+fn none_or_two_motions_are_refused_in_plain_words() {
+    let two = SMALL.replace("[sensors.radar]", "random_walk = { density = 1.0 }\n[sensors.radar]");
+    let message = refusal(&two);
+    assert!(
+        message.contains("exactly one") && message.contains("constant_velocity, random_walk"),
+        "{message}"
+    );
+    let none = SMALL.replace("constant_velocity = { acceleration_density = 1.0 }", "");
+    assert!(refusal(&none).contains("it is empty"));
+}
+
+#[test]
 fn a_value_out_of_range_is_named_with_its_range() {
     let message = refusal(&format!("{SMALL}detection = 1.5"));
     assert!(message.contains("probability"), "{message}");

@@ -46,6 +46,13 @@ impl Outcome {
             self.report(arguments, evaluation)?.write(path)?;
         }
         self.run.finish()?;
+        let late = self.run.summary().late;
+        if late > 0 {
+            let late = counted(late, "scan");
+            console.warn(format_args!(
+                "{late} too late and left out; out_of_order = \"buffer\" in [input] sorts them in"
+            ));
+        }
         if arguments.json {
             return print_json(&self.json(arguments, evaluation));
         }
@@ -82,7 +89,10 @@ impl Outcome {
             ("tracks", format!("{} confirmed", count(summary.confirmed))),
             (
                 "speed",
-                self.speed().map_or("-".to_owned(), |speed| format!("{} scans/s", count(speed as u64))),
+                self.speed().map_or("-".to_owned(), |speed| match speed {
+                    speed if speed < 10.0 => format!("{speed:.1} scans/s"),
+                    speed => format!("{} scans/s", count(speed as u64)),
+                }),
             ),
         ]
     }
