@@ -257,8 +257,8 @@ fn a_study_shows_its_tables_its_curves_and_an_example_with_a_track_for_each_meth
         browser.value(first),
         json!(["oracle", "measurement", "oracle", "measurement", "oracle", "oracle", "imm-paper"])
     );
-    // Position and velocity over time; distance, true and told manoeuvres, and the number of tracks below the plan.
-    assert_eq!(browser.value("document.querySelectorAll('.chart-figure').length"), json!(6));
+    // Position and velocity over time; distance, true and told manoeuvres below the plan.
+    assert_eq!(browser.value("document.querySelectorAll('.chart-figure').length"), json!(5));
     assert!(number(&mut browser, "ink()") > 500.0);
     assert_eq!(browser.complaints(), [""; 0]);
 }
