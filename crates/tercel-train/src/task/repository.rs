@@ -39,11 +39,16 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes")
 }
 
-/// The shipped models of a kind, each with its recipe, whose data are a few flights.
+/// The shipped models of a kind, each with its recipe, whose data are a few flights. Of models with the same options the first, since
+/// they differ in what they have learned alone.
 pub fn models(kind: &str) -> Vec<(Model, String)> {
-    let models = shipped::NAMES.into_iter().map(model);
-    let models = models.filter(|model| model.card().kind == kind);
-    models.map(|model| (recipe(&model.card().name), model)).map(|(text, model)| (model, text)).collect()
+    let mut models: Vec<Model> = Vec::new();
+    for model in shipped::NAMES.into_iter().map(model).filter(|model| model.card().kind == kind) {
+        if models.iter().all(|other| other.card().hyper != model.card().hyper) {
+            models.push(model);
+        }
+    }
+    models.into_iter().map(|model| (recipe(&model.card().name), model)).map(|(text, model)| (model, text)).collect()
 }
 
 /// The shipped model of this name.
