@@ -96,7 +96,12 @@ impl Place {
 
     fn read(&self) -> Result<Model, Failure> {
         Ok(match self {
-            Place::File(path) => Model::open(path)?,
+            Place::File(path) => Model::open(path).map_err(|error| match path.exists() {
+                true => Failure::from(error),
+                false => {
+                    Failure::from(error).with_help("`tercel models list` names those that come with Tercel")
+                }
+            })?,
             Place::Shipped(name) => shipped::model(name)?,
         })
     }

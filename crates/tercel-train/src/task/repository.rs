@@ -48,7 +48,11 @@ pub fn models(kind: &str) -> Vec<(Model, String)> {
             models.push(model);
         }
     }
-    models.into_iter().map(|model| (recipe(&model.card().name), model)).map(|(text, model)| (model, text)).collect()
+    models
+        .into_iter()
+        .map(|model| (recipe(&model.card().name), model))
+        .map(|(text, model)| (model, text))
+        .collect()
 }
 
 /// The shipped model of this name.
