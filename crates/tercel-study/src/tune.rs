@@ -16,7 +16,7 @@ pub struct Knob {
 /// Changes one knob after the other to the value with the lowest cost, until no change helps or `rounds` rounds are over.
 /// Each knob moves at most three places a round. Values that make no configuration are passed over.
 ///
-/// A choice is judged by the mean of its cost and of the costs with all knobs off by [`OFF`], in two ways: few data have lucky
+/// A choice is judged by the mean of its cost and of the costs with all knobs off by 7 %, in two ways: few data have lucky
 /// combinations of numbers, which do not outlive a change of the scene.
 ///
 /// The result depends on nothing but the arguments: the order of the knobs is the order given, and of equal costs the first
