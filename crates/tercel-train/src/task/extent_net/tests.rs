@@ -261,7 +261,7 @@ fn a_recipe_that_makes_no_sense_is_refused_by_key() {
 #[test]
 fn the_recipes_of_the_repository_are_understood() {
     let recipes = repository::recipes(ExtentNetKind::NAME);
-    assert_eq!(recipes.len(), 18);
+    assert_eq!(recipes.len(), 20);
     for text in recipes {
         let recipe = Recipe::<ExtentNetKind>::parse(&text).unwrap();
         ExtentNetTask::new(&recipe, Some(repository::turning_flights(201))).unwrap();
