@@ -44,7 +44,10 @@ impl Target {
 
 /// Refuses to write over what is read.
 pub fn keep_inputs<'a>(outputs: impl IntoIterator<Item = &'a Path>, inputs: &[&Path]) -> Result<(), Failure> {
-    let same = |one: &Path, other: &Path| matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other);
+    // Two paths are one file only if it is there.
+    let same = |one: &Path, other: &Path| {
+        one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
+    };
     match outputs.into_iter().find(|output| inputs.iter().any(|input| same(output, input))) {
         Some(path) => {
             Err(Failure::usage(format!("{}: an output names the same file as an input", path.display())))

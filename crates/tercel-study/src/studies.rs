@@ -71,6 +71,12 @@ impl MonteCarlo {
     ) -> Self {
         MonteCarlo { seed, runs, sets: &[], options: &[], data: false, build }
     }
+
+    /// A study of airliners on recorded tracks.
+    const fn on_tracks(build: fn(&Request<'_>) -> Result<Box<dyn Experiment>, StudyError>) -> Self {
+        let sets = &["course", "smoothed", "crab", "even"];
+        MonteCarlo { sets, data: true, ..MonteCarlo::new(extended::SEED, 52, build) }
+    }
 }
 
 /// Something of which a study has several kinds.
@@ -208,21 +214,13 @@ pub const STUDIES: [Study; 16] = [
         name: "aircraft",
         about: "airliners on recorded tracks, seen as many points (RMMNet paper, Table II)",
         methods: &extended::methods::AIRCRAFT_METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            sets: &["course", "smoothed", "crab", "even"],
-            data: true,
-            ..MonteCarlo::new(extended::SEED, 52, |r| boxed(ExtendedExperiment::aircraft(r)))
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::on_tracks(|r| boxed(ExtendedExperiment::aircraft(r)))),
     },
     Study {
         name: "aircraft-random",
         about: "the same with tracks to test on that are drawn from all",
         methods: &extended::methods::RANDOM_METHODS,
-        kind: Kind::MonteCarlo(MonteCarlo {
-            sets: &["course", "smoothed", "crab", "even"],
-            data: true,
-            ..MonteCarlo::new(extended::SEED, 52, |r| boxed(ExtendedExperiment::aircraft_random(r)))
-        }),
+        kind: Kind::MonteCarlo(MonteCarlo::on_tracks(|r| boxed(ExtendedExperiment::aircraft_random(r)))),
     },
     Study {
         name: "extended-scene",
@@ -496,6 +494,20 @@ mod tests {
         let twice = Some(vec!["measurement".to_owned(); 2]);
         assert!(message(&Choice { methods: twice, ..Choice::default() }, "atc-test").contains("twice"));
         assert!(message(&Choice::default(), "autoferry").contains("recordings"));
+    }
+
+    #[test]
+    fn a_model_that_no_method_uses_is_refused() {
+        let choice = |study: &str, model: &str| {
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join("mine.safetensors");
+            tercel_neural::shipped::model(model).unwrap().save(&file).unwrap();
+            let models = [(model.to_owned(), file)].into();
+            Study::find(study).unwrap().experiment(&Choice { models, ..Choice::default() }).err()
+        };
+        let error = choice("vehicle-data", "rmmnet-vehicle").unwrap().to_string();
+        assert!(error.contains("`rmmnet-vehicle`") && error.contains("rmmnet-data-100"), "{error}");
+        assert!(choice("vehicle-data", "rmmnet-data-300").is_none());
     }
 
     #[test]

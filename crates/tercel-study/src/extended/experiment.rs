@@ -32,20 +32,22 @@ pub struct ExtendedExperiment {
 
 impl ExtendedExperiment {
     /// The study of this name over a scene. `options` says in the tables what was chosen of it, and
-    /// `settings` are the numbers to which filters are tuned.
+    /// `settings` are the numbers to which filters are tuned, under each condition.
     ///
     /// # Errors
     /// When a method is not known.
     fn new(
         study: &'static str,
         scene: Scene,
-        settings: &Settings,
+        settings: &[Settings],
         options: BTreeMap<String, String>,
         (seed, runs): (u64, u64),
         (names, models): (&[String], &Models),
     ) -> Result<Self, StudyError> {
-        let methods: Result<_, StudyError> =
-            names.iter().map(|name| method(study, name, settings, models)).collect();
+        let under = |settings: &Settings| -> Result<_, StudyError> {
+            names.iter().map(|name| method(study, name, settings, models)).collect()
+        };
+        let methods = settings.iter().map(under).collect::<Result<_, _>>()?;
         let quantity = |(name, unit, shown): (&str, &str, bool)| Quantity {
             name: name.to_owned(),
             unit: unit.to_owned(),
@@ -61,7 +63,7 @@ impl ExtendedExperiment {
             metrics: METRICS.map(quantity).to_vec(),
             curves: curves(&scene),
         };
-        Ok(ExtendedExperiment { plan, scene, methods: vec![methods?] })
+        Ok(ExtendedExperiment { plan, scene, methods })
     }
 
     /// The study `vehicle`.
@@ -85,7 +87,7 @@ impl ExtendedExperiment {
         Self::new(
             "vehicle",
             Scene::Vehicle(vehicle),
-            &settings,
+            &[settings],
             options,
             drawn,
             (request.methods, request.models),
@@ -97,47 +99,46 @@ impl ExtendedExperiment {
         let scene = Scene::Vehicle(Vehicle::new(Generator::Reject));
         let drawn = (request.seed, request.runs);
         let chosen = (request.methods, request.models);
-        Self::new("vehicle-ablation", scene, &Settings::REJECT, BTreeMap::new(), drawn, chosen)
+        Self::new("vehicle-ablation", scene, &[Settings::REJECT], BTreeMap::new(), drawn, chosen)
     }
 
     /// The study `vehicle-data`: how much networks must have seen.
     pub(crate) fn data(request: &Request<'_>) -> Result<Self, StudyError> {
-        const STUDY: &str = "vehicle-data";
         let scene = Scene::Vehicle(Vehicle::new(Generator::Reject));
         let drawn = (request.seed, request.runs);
         let chosen = (request.methods, request.models);
-        let first = Self::new(STUDY, scene, &Settings::REJECT, BTreeMap::new(), drawn, chosen)?;
-        let learned = |models: [&'static str; 3]| {
-            let [lstm, transformer, rmmnet] = models;
-            let settings = Settings { lstm, transformer, rmmnet, ..Settings::REJECT };
-            let methods = request.methods.iter();
-            methods.map(|name| method(STUDY, name, &settings, request.models)).collect()
-        };
-        let methods = DATA_MODELS.iter().map(|(_, models)| learned(*models));
+        let settings = DATA_MODELS.map(|(_, [lstm, transformer, rmmnet])| Settings {
+            lstm,
+            transformer,
+            rmmnet,
+            ..Settings::REJECT
+        });
+        let first = Self::new("vehicle-data", scene, &settings, BTreeMap::new(), drawn, chosen)?;
         let sweep = Sweep {
             name: "trajectories".to_owned(),
             label: "Vehicles to learn from".to_owned(),
-            values: DATA_MODELS.iter().map(|(count, _)| f64::from(*count)).collect(),
+            values: DATA_MODELS.map(|(count, _)| f64::from(count)).to_vec(),
         };
+        // A sweep is drawn over what it changes, not over time.
         let plan = Plan { sweep: Some(sweep), curves: Vec::new(), ..first.plan };
-        Ok(ExtendedExperiment { plan, methods: methods.collect::<Result<_, StudyError>>()?, ..first })
+        Ok(ExtendedExperiment { plan, ..first })
     }
 
     /// The study `aircraft-random`: `aircraft` with other tracks to test on.
     pub(crate) fn aircraft_random(request: &Request<'_>) -> Result<Self, StudyError> {
         let settings = Settings { rmmnet: "rmmnet-aircraft-random", ..Settings::AIRCRAFT };
-        Self::on_tracks("aircraft-random", Held::Random, &settings, request)
+        Self::on_tracks("aircraft-random", Held::Random, settings, request)
     }
 
     /// The study `aircraft`.
     pub(crate) fn aircraft(request: &Request<'_>) -> Result<Self, StudyError> {
-        Self::on_tracks("aircraft", Held::Last, &Settings::AIRCRAFT, request)
+        Self::on_tracks("aircraft", Held::Last, Settings::AIRCRAFT, request)
     }
 
     fn on_tracks(
         study: &'static str,
         held: Held,
-        settings: &Settings,
+        settings: Settings,
         request: &Request<'_>,
     ) -> Result<Self, StudyError> {
         let heading = match request.set {
@@ -160,16 +161,14 @@ impl ExtendedExperiment {
         let data = ("data".to_owned(), path.display().to_string());
         let drawn = (request.seed, request.runs.min(count));
         let scene = Scene::Aircraft(aircraft);
-        Self::new(study, scene, settings, [set, data].into(), drawn, (request.methods, request.models))
+        Self::new(study, scene, &[settings], [set, data].into(), drawn, (request.methods, request.models))
     }
 
     /// Whether the scenes are those of the publication, as far as it describes them.
     fn is_published(&self) -> bool {
         match &self.scene {
             Scene::Vehicle(_) => self.plan.options.get("sizes").is_none_or(|sizes| sizes == "fixed"),
-            Scene::Aircraft(aircraft) => {
-                self.plan.study == "aircraft" && aircraft.count() == PUBLISHED_TRACKS
-            }
+            Scene::Aircraft(aircraft) => aircraft.count() == PUBLISHED_TRACKS,
         }
     }
 

@@ -64,6 +64,19 @@ pub struct Sweep {
     pub values: Vec<f64>,
 }
 
+impl Sweep {
+    /// Label and values as a chart shows them: logarithms, where the values are of different orders.
+    pub(crate) fn abscissa(&self) -> (String, Vec<f64>) {
+        let least = self.values.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = self.values.iter().copied().fold(0.0, f64::max);
+        if least > 0.0 && most >= 100.0 * least {
+            let label = format!("{}, logarithm to base 10", self.label);
+            return (label, self.values.iter().map(|value| value.log10()).collect());
+        }
+        (self.label.clone(), self.values.clone())
+    }
+}
+
 /// A metric.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -167,7 +167,8 @@ impl Results {
 
     fn sweep_chart(&self, table: &StudyTable, metric: &Quantity, sweep: &Sweep) -> Chart {
         let methods = self.plan.methods.len();
-        let start = Chart::over(&metric.name, &metric.unit, &sweep.label, sweep.values.clone());
+        let (label, values) = sweep.abscissa();
+        let start = Chart::over(&metric.name, &metric.unit, label, values);
         self.plan.methods.iter().enumerate().fold(start, |chart, (method, name)| {
             let rows: Vec<&Row> = table.rows.iter().skip(method).step_by(methods).collect();
             let column = |value: fn(&Figure) -> f64| -> Vec<f64> {

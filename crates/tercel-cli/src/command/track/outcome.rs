@@ -150,7 +150,12 @@ impl Outcome {
     fn report(&self, arguments: &TrackArguments, evaluation: Option<&Evaluation>) -> Result<Report, Failure> {
         let mut summary = report::Summary::new();
         for (name, value) in self.figures() {
-            summary = summary.with(name, value, None);
+            // A box has room for the first figure; what belongs to it stands below.
+            let (first, rest) = match value.split_once(": ").or_else(|| value.split_once(", ")) {
+                Some((first, rest)) => (first, Some(rest)),
+                None => (value.as_str(), None),
+            };
+            summary = summary.with(name, first, rest);
         }
         for (name, value) in evaluation.iter().flat_map(|evaluation| &evaluation.means) {
             summary = summary.with(*name, score(name, *value), None);
