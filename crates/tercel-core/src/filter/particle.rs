@@ -36,7 +36,8 @@ use crate::sensor::{Measurement, Reading, Sensor};
 /// ## Reference
 /// Gordon, Salmond and Smith (1993), algorithm of section 3; systematic resampling of Kitagawa (1996), appendix.
 /// Deviations: weights in the log domain; resampling only below a number of effective particles (Liu and Chen (1998)); smoothing, when asked for, as Liu and West
-/// (2001), section 10.3. The Gaussian beginning ([`with_tentative`](Particle::with_tentative)) is a step of the Gaussian particle filter of Kotecha and Djurić (2003).
+/// (2001), section 10.3; the Gaussian beginning, when asked for ([`with_tentative`](Particle::with_tentative)), is a step of Kotecha
+/// and Djurić (2003).
 ///
 /// ```
 /// use tercel_core::{filter::{Filter, Particle}, motion::ConstantVelocity, sensor::RangeBearing};
