@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::column::{Angles, Column};
 use crate::error::DataError;
-use crate::table::Origin;
+use crate::table::{Description, Origin};
 
 /// Version of the tables that this library writes. A reader refuses later ones.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -27,6 +27,8 @@ pub(crate) struct Metadata {
     pub labels: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub modes: Vec<String>,
+    #[serde(default, skip_serializing_if = "Description::is_empty")]
+    pub description: Description,
 }
 
 impl Metadata {

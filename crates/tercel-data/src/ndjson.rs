@@ -39,7 +39,7 @@ use crate::layout::{
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
 use crate::sheet::Sheet;
-use crate::table::{Detections, Origin, Scan, Track};
+use crate::table::{Description, Detections, Origin, Scan, Track};
 
 /// Key of the list in a line that is a whole scan.
 const LIST: &str = "detections";
@@ -73,6 +73,7 @@ pub struct Scans<R> {
     options: ReadOptions,
     sheet: Sheet,
     origin: Option<Origin>,
+    description: Description,
     next_id: u64,
     /// Keys that are no columns and look like none.
     strangers: HashSet<String>,
@@ -90,6 +91,7 @@ impl<R: BufRead> Scans<R> {
             sheet: Sheet::new(options.relaxed(detection_columns())),
             options,
             origin: None,
+            description: Description::default(),
             next_id: 0,
             strangers: HashSet::new(),
             open: None,
@@ -100,6 +102,11 @@ impl<R: BufRead> Scans<R> {
     /// Where the local frame lies, once a line has said so.
     pub fn origin(&self) -> Option<Origin> {
         self.origin
+    }
+
+    /// What the recording was before it became this stream, as far as the lines read so far say.
+    pub fn description(&self) -> Description {
+        self.description.clone()
     }
 
     /// Takes in a line; a scan that it completes is handed out.
@@ -135,6 +142,7 @@ impl<R: BufRead> Scans<R> {
         let metadata = Metadata::parse(json, Detections::TABLE, self.lines.file())?;
         metadata.check_units(&self.sheet.columns, self.options.angles, self.lines.file())?;
         self.origin = metadata.origin;
+        self.description = metadata.description;
         Ok(())
     }
 
@@ -281,6 +289,7 @@ impl<R: BufRead> Iterator for Scans<R> {
 ///     covariance: vec![4.0, 0.0, 4.0],
 ///     modes: vec![],
 ///     extent: None,
+///     identity: None,
 ///     detection: None,
 /// };
 /// let mut line = Vec::new();

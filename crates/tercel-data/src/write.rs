@@ -147,6 +147,7 @@ pub fn write_metrics_to(
 ///     covariance: vec![4.0, 0.0, 4.0],
 ///     modes: vec![],
 ///     extent: None,
+///     identity: None,
 ///     detection: Some(17),
 /// }])?;
 /// assert!(!path.exists(), "the file appears when it is complete");

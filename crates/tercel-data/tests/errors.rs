@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use tercel_data::ndjson::Scans;
-use tercel_data::table::{Detection, Detections, Noise, Observation, Scan, Tracks};
+use tercel_data::table::{Detection, Detections, Observation, Scan, Tracks};
 use tercel_data::{
     Angles, DataError, Format, ImportOptions, ReadOptions, TracksWriter, import, read_detections,
     read_detections_from, read_metrics_from, read_tracks_from, read_truths_from, write_detections,
@@ -65,7 +65,6 @@ fn detections_in_csv() {
         ("measurement without number", "time,sensor,detection,x,y\n0,radar,,1,2\n"),
         ("number without measurement", "time,sensor,detection,x,y\n0,radar,3,,\n"),
         ("number with a fraction", "time,sensor,detection,x,y\n0,radar,1.5,1,2\n"),
-        ("two times in a scan", "time,sensor,scan,x,y\n0,radar,1,1,2\n0.5,radar,1,1,2\n"),
         ("two places in a scan", "time,sensor,x,y,sensor_x,sensor_y\n0,radar,1,2,0,0\n0,radar,1,2,0,9\n"),
         ("half a place", "time,sensor,x,y,sensor_x,sensor_y\n0,radar,1,2,0,\n"),
         ("short line", "time,sensor,x,y\n0,radar,1,2\n1,rad"),
@@ -212,12 +211,9 @@ fn files_that_cannot_be_read_or_written() {
 
 fn one(sensor: &str, x: f64, ids: &[u64]) -> Detections {
     let observation = Observation::Position { x, y: 0.0, z: None };
-    let detection = |&id: &u64| Detection { id, observation, noise: Noise::default(), truth: None };
+    let detection = |&id: &u64| Detection::new(id, observation);
     let detections = ids.iter().map(detection).collect();
-    Detections {
-        origin: None,
-        scans: vec![Scan { time: 0.0, sensor: sensor.into(), position: None, detections }],
-    }
+    Detections { scans: vec![Scan::new(0.0, sensor, detections)], ..Detections::default() }
 }
 
 #[test]

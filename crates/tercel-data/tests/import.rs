@@ -237,7 +237,7 @@ fn tables_of_other_frames_are_not_mixed() {
     let folder = tempfile::tempdir().unwrap();
     let paths = [None, Some(ORIGIN)].map(|origin| {
         let path = folder.path().join(format!("{}.csv", origin.is_some()));
-        write_detections(&path, &Detections { origin, scans: Vec::new() }).unwrap();
+        write_detections(&path, &Detections { origin, ..Detections::default() }).unwrap();
         path
     });
     let error = import(Source::Csv, &paths, &ImportOptions::default()).unwrap_err();

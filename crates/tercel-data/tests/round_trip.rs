@@ -94,6 +94,7 @@ fn csv_and_parquet_have_the_same_columns() {
             covariance: vec![0.0; 10],
             modes: vec![1.0],
             extent: None,
+            identity: None,
             detection: None,
         }],
         origin: None,

@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use tercel_pipeline::{Config, Pipeline};
-//! use tercel_data::table::{Detection, Noise, Observation, Scan};
+//! use tercel_data::table::{Detection, Observation, Scan};
 //!
 //! let config = Config::parse(
 //!     r#"
@@ -19,8 +19,8 @@
 //! )?;
 //! let mut pipeline = Pipeline::new(&config)?;
 //! let observation = Observation::Position { x: 100.0, y: 50.0, z: None };
-//! let detection = Detection { id: 1, observation, noise: Noise::default(), truth: None };
-//! let scan = Scan { time: 0.0, sensor: "radar".into(), position: None, detections: vec![detection] };
+//! let detection = Detection::new(1, observation);
+//! let scan = Scan::new(0.0, "radar", vec![detection]);
 //! let rows = pipeline.push(scan)?;
 //! assert_eq!(rows[0].state, [100.0, 50.0, 0.0, 0.0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

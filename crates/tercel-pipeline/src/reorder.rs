@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     fn scan(time: f64) -> Scan {
-        Scan { time, sensor: "radar".into(), position: None, detections: Vec::new() }
+        Scan::new(time, "radar", Vec::new())
     }
 
     fn released(delay: f64, times: &[f64]) -> (Vec<f64>, usize) {

@@ -1,7 +1,7 @@
 //! Pipelines as a whole.
 
 use crate::{Config, Pipeline, PipelineError};
-use tercel_data::table::{Detection, Noise, Observation, Scan, Status};
+use tercel_data::table::{Detection, Observation, Scan, Status};
 
 /// A configuration with this motion, these filter and tracker sections and this `measures`.
 fn config(motion: &str, sections: &str, measures: &str) -> Config {
@@ -16,10 +16,9 @@ const STRAIGHT: &str = "constant_velocity = { acceleration_density = 0.5, speed 
 const POSITION: &str = "{ position = { deviation = 5.0 } }";
 
 fn scan(time: f64, observations: &[Observation]) -> Scan {
-    let detection =
-        |(id, &observation): (u64, _)| Detection { id, observation, noise: Noise::default(), truth: None };
+    let detection = |(id, &observation): (u64, _)| Detection::new(id, observation);
     let detections = (time as u64 * 100..).zip(observations).map(detection).collect();
-    Scan { time, sensor: "radar".into(), position: None, detections }
+    Scan::new(time, "radar", detections)
 }
 
 /// What a sensor says of an object that moves straight past it.

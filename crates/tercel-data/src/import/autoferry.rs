@@ -25,11 +25,11 @@ use std::sync::Arc;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::{ImportOptions, Imported};
+use super::{ImportOptions, Imported, Source};
 use crate::column::wrapped;
 use crate::error::{DataError, Place, Spot};
 use crate::format::{decompressed, open, read_error};
-use crate::table::{Detection, Detections, Noise, Observation, Origin, Scan, Truth, Truths};
+use crate::table::{Description, Detection, Detections, Observation, Origin, Scan, Truth, Truths};
 
 /// The pier where the frame of the recordings begins: 63.4389029083° N, 10.39908278° E, 39.923 m.
 pub const PIREN: Origin = Origin {
@@ -160,18 +160,21 @@ fn read_detections(reader: impl Read, file: &Arc<str>) -> Result<Detections, Dat
         let observations = if scan.sensor <= 2 { positions(scan) } else { bearings(scan) };
         let observations =
             observations.ok_or_else(|| wrong("the measurement has another shape".to_owned()))?;
-        let detection = |observation| Detection { id: 0, observation, noise: Noise::default(), truth: None };
+        let detection = |observation| Detection::new(0, observation);
         scans.push(Scan {
             time: scan.time,
             sensor: Arc::clone(sensor),
             position: Some([scan.own[1], scan.own[0], 0.0]),
+            velocity: None,
             detections: observations.into_iter().map(detection).collect(),
         });
     }
     scans.sort_by(|a, b| a.time.total_cmp(&b.time));
     let detections = scans.iter_mut().flat_map(|scan| &mut scan.detections);
     detections.zip(0..).for_each(|(detection, id)| detection.id = id);
-    Ok(Detections { origin: Some(PIREN), scans })
+    let description =
+        Description { source: Some(Source::Autoferry.name().to_owned()), ..Description::default() };
+    Ok(Detections { origin: Some(PIREN), description, scans })
 }
 
 /// Positions of a scan of the radar or the lidar: none, one as `[north, east]`, or `[[north...], [east...]]`.

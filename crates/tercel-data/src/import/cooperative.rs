@@ -9,7 +9,9 @@ use tercel_core::geo::{Geodetic, LocalFrame};
 use super::{ImportOptions, Imported, LeftOut};
 use crate::column::wrapped;
 use crate::error::{DataError, Place};
-use crate::table::{Detection, Detections, Noise, Observation, Origin, Scan, Truth, Truths};
+use crate::table::{
+    Description, Detection, Detections, Observation, Origin, Scan, SensorDescription, Truth, Truths,
+};
 
 /// One report of an object about itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,24 +73,21 @@ pub(super) fn tables(
             });
         }
         let detection = Detection {
-            id,
-            observation: Observation::Position { x: enu.x, y: enu.y, z },
-            noise: Noise::default(),
+            identity: report.object.clone(),
             truth: report.object,
+            ..Detection::new(id, Observation::Position { x: enu.x, y: enu.y, z })
         };
         match scans.last_mut().filter(|scan| scan.time == report.time) {
             Some(scan) => scan.detections.push(detection),
-            None => scans.push(Scan {
-                time: report.time,
-                sensor: Arc::clone(&sensor),
-                position: None,
-                detections: vec![detection],
-            }),
+            None => scans.push(Scan::new(report.time, Arc::clone(&sensor), vec![detection])),
         }
     }
     let origin = Some(origin);
+    let reports = SensorDescription { reports: true, identity: true, interval: None };
+    let description =
+        Description { source: Some(sensor.to_string()), sensors: [(sensor.to_string(), reports)].into() };
     Ok(Imported {
-        detections: Detections { origin, scans },
+        detections: Detections { origin, description, scans },
         truths: options.truths.then_some(Truths { origin, rows: truths }),
         left_out,
     })

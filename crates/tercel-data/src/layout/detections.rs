@@ -17,6 +17,7 @@ use crate::table::{Detection, Detections, Noise, Observation, Scan};
 /// The columns of the table.
 pub(crate) fn detection_columns() -> Vec<Column> {
     let length = |name| Column::real(name, "m", Limits::Finite);
+    let speed = |name| Column::real(name, "m/s", Limits::Finite);
     let sigma = |name, unit| Column::real(name, unit, Limits::Positive);
     vec![
         Column::time(),
@@ -38,6 +39,10 @@ pub(crate) fn detection_columns() -> Vec<Column> {
         length("sensor_x"),
         length("sensor_y"),
         length("sensor_z"),
+        speed("sensor_vx"),
+        speed("sensor_vy"),
+        speed("sensor_vz"),
+        Column::text("identity"),
         Column::text("truth"),
     ]
 }
@@ -50,7 +55,7 @@ impl Layout for Detections {
     }
 
     fn metadata(&self) -> Metadata {
-        Metadata::new(Self::TABLE, self.origin)
+        Metadata { description: self.description.clone(), ..Metadata::new(Self::TABLE, self.origin) }
     }
 
     fn fill(&self, sheet: &mut Sheet, file: &Arc<str>) -> Result<(), DataError> {
@@ -85,7 +90,7 @@ impl Layout for Detections {
             }
             scans.push(scan);
         }
-        Ok(Detections { origin: lines.origin(), scans })
+        Ok(Detections { origin: lines.origin(), description: lines.description(), scans })
     }
 
     fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError> {
@@ -108,14 +113,14 @@ impl Layout for Detections {
             }
             last = number;
         }
-        Ok(Detections { origin: metadata.origin, scans })
+        Ok(Detections { origin: metadata.origin, description: metadata.description, scans })
     }
 }
 
 fn fill_row(sheet: &mut Sheet, number: u64, scan: &Scan, detection: Option<&Detection>) {
     let mut filler = sheet.filler();
     filler
-        .real(scan.time)
+        .real(detection.and_then(|detection| detection.time).unwrap_or(scan.time))
         .text(Some(&scan.sensor))
         .count(number)
         .count(detection.map(|detection| detection.id));
@@ -133,7 +138,13 @@ fn fill_row(sheet: &mut Sheet, number: u64, scan: &Scan, detection: Option<&Dete
         Some(position) => filler.reals(position.map(Some)),
         None => filler.reals([None; 3]),
     };
-    filler.text(detection.and_then(|detection| detection.truth.as_ref()));
+    match scan.velocity {
+        Some(velocity) => filler.reals(velocity.map(Some)),
+        None => filler.reals([None; 3]),
+    };
+    filler
+        .text(detection.and_then(|detection| detection.identity.as_ref()))
+        .text(detection.and_then(|detection| detection.truth.as_ref()));
 }
 
 fn repeated(place: Place, id: u64) -> DataError {
@@ -151,6 +162,7 @@ pub(crate) struct DetectionRow {
     /// Number of the scan, when the file numbers them.
     pub scan: Option<u64>,
     pub position: Option<[f64; 3]>,
+    pub velocity: Option<[f64; 3]>,
     /// Nothing in a scan without detections.
     pub detection: Option<Detection>,
 }
@@ -166,24 +178,33 @@ impl DetectionRow {
             }
     }
 
-    /// Adds this row to the scan that it continues.
-    pub fn join(self, scan: &mut Scan, place: impl FnOnce() -> Place) -> Result<(), DataError> {
-        let problem = if self.time != scan.time {
-            format!("the time is {}, but the scan began with {}", self.time, scan.time)
-        } else if self.position.is_some() && self.position != scan.position {
+    /// Adds this row to the scan that it continues. Where the times differ each detection keeps its own, and the scan takes
+    /// the last.
+    pub fn join(mut self, scan: &mut Scan, place: impl FnOnce() -> Place) -> Result<(), DataError> {
+        let problem = if self.position.is_some() && self.position != scan.position {
             "the sensor is at another place than in the row before, in the same scan".to_owned()
         } else {
+            if self.time > scan.time {
+                for detection in &mut scan.detections {
+                    detection.time.get_or_insert(scan.time);
+                }
+                scan.time = self.time;
+            } else if self.time < scan.time
+                && let Some(detection) = &mut self.detection
+            {
+                detection.time = Some(self.time);
+            }
             scan.detections.extend(self.detection);
             return Ok(());
         };
-        let help = "a scan has one time and one place: give the rows different numbers in the column `scan`";
+        let help = "a scan has one place: give the rows different numbers in the column `scan`";
         Err(DataError::Row { place: place(), problem, help })
     }
 
     /// The scan that begins with this row.
     pub fn start(self) -> Scan {
-        let DetectionRow { time, sensor, position, detection, .. } = self;
-        Scan { time, sensor, position, detections: detection.into_iter().collect() }
+        let DetectionRow { time, sensor, position, velocity, detection, .. } = self;
+        Scan { time, sensor, position, velocity, detections: detection.into_iter().collect() }
     }
 }
 
@@ -202,6 +223,9 @@ pub(crate) struct Rows<'a> {
     noise: [Cells<'a, f64>; 6],
     position: Group<'a, 2>,
     height: Cells<'a, f64>,
+    velocity: Group<'a, 2>,
+    climb: Cells<'a, f64>,
+    identity: Cells<'a, Arc<str>>,
     truth: Cells<'a, Arc<str>>,
 }
 
@@ -221,6 +245,9 @@ impl<'a> Rows<'a> {
             noise: sigmas.map(|name| sheet.reals(name)),
             position: Group::new(sheet, ["sensor_x", "sensor_y"]),
             height: sheet.reals("sensor_z"),
+            velocity: Group::new(sheet, ["sensor_vx", "sensor_vy"]),
+            climb: sheet.reals("sensor_vz"),
+            identity: sheet.texts("identity"),
             truth: sheet.texts("truth"),
         }
     }
@@ -265,15 +292,19 @@ impl<'a> Rows<'a> {
         let [x, y, z, range, bearing, range_rate] = self.noise.map(|cells| cells.get(row));
         let noise = Noise { x, y, z, range, bearing, range_rate };
         let position = self.position.get(row, place)?;
+        let velocity = self.velocity.get(row, place)?;
         Ok(DetectionRow {
             time: self.time.get(row).unwrap_or_default(),
             sensor: self.sensor(row)?,
             scan: self.scan.get(row),
             position: position.map(|[x, y]| [x, y, self.height.get(row).unwrap_or(0.0)]),
+            velocity: velocity.map(|[x, y]| [x, y, self.climb.get(row).unwrap_or(0.0)]),
             detection: observation.map(|observation| Detection {
                 id,
+                time: None,
                 observation,
                 noise,
+                identity: self.identity.get(row),
                 truth: self.truth.get(row),
             }),
         })

@@ -57,6 +57,7 @@ pub(crate) fn track_columns(labels: &[String], modes: &[String]) -> Vec<Column> 
         ..Column::named(format!("mode_{mode}"), String::new())
     }));
     columns.extend(extent_columns());
+    columns.push(Column::text("identity"));
     columns.push(Column::count("detection"));
     columns
 }
@@ -97,7 +98,7 @@ pub(crate) fn fill_tracks(
             Some(extent) => filler.reals(extent.map(Some)),
             None => filler.reals([None; 3]),
         };
-        filler.count(track.detection);
+        filler.text(track.identity.as_ref()).count(track.detection);
     }
     Ok(())
 }
@@ -157,6 +158,7 @@ struct Reader<'a> {
     covariance: Vec<Cells<'a, f64>>,
     modes: Vec<Cells<'a, f64>>,
     extent: Group<'a, 3>,
+    identity: Cells<'a, Arc<str>>,
     detection: Cells<'a, u64>,
 }
 
@@ -174,6 +176,7 @@ impl<'a> Reader<'a> {
             covariance: covariance_names(labels).map(|(a, b)| sheet.reals(&format!("cov_{a}_{b}"))).collect(),
             modes: modes.iter().map(|mode| sheet.reals(&format!("mode_{mode}"))).collect(),
             extent: Group::new(sheet, EXTENT),
+            identity: sheet.texts("identity"),
             detection: sheet.counts("detection"),
         }
     }
@@ -200,6 +203,7 @@ impl<'a> Reader<'a> {
             covariance,
             modes,
             extent: self.extent.get(row, place)?,
+            identity: self.identity.get(row),
             detection: self.detection.get(row),
         })
     }

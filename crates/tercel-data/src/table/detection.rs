@@ -1,6 +1,9 @@
 //! What the sensors saw.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use super::Origin;
 
@@ -9,6 +12,8 @@ use super::Origin;
 pub struct Detections {
     /// Where the local frame lies, if it is known.
     pub origin: Option<Origin>,
+    /// What the recording was before it became a table.
+    pub description: Description,
     /// The scans. In the file, a scan without detections is one row whose detection is empty.
     pub scans: Vec<Scan>,
 }
@@ -16,12 +21,15 @@ pub struct Detections {
 /// What one sensor saw at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
-    /// Seconds; any epoch, as long as it is the same for the whole recording.
+    /// Seconds; any epoch, as long as it is the same for the whole recording. That of the last detection, where these have
+    /// times of their own.
     pub time: f64,
     /// Name of the sensor: the key of its section in a configuration.
     pub sensor: Arc<str>,
     /// Position of the sensor in the local frame (`x, y, z`), m, when it came with the data.
     pub position: Option<[f64; 3]>,
+    /// Velocity of the sensor in the local frame (`x, y, z`), m/s, when it came with the data.
+    pub velocity: Option<[f64; 3]>,
     /// What was seen; may be empty, which tells a tracker that nothing was.
     pub detections: Vec<Detection>,
 }
@@ -31,12 +39,64 @@ pub struct Scan {
 pub struct Detection {
     /// Number of the detection, unique in its recording.
     pub id: u64,
+    /// When the object was measured, s, where that is not the time of the scan: a radar that turns sees one object after the
+    /// other.
+    pub time: Option<f64>,
     /// What was measured.
     pub observation: Observation,
     /// Standard deviations that came with the detection, if any.
     pub noise: Noise,
-    /// Identity of the object behind it, when it is known (simulations, cooperative reports).
+    /// What the object or the sensor says that it is: the number of a ship (MMSI), the address or code of an aircraft, the
+    /// number of a track that the sensor keeps. Evidence for the tracker, which may be wrong.
+    pub identity: Option<Arc<str>>,
+    /// The object that is really behind it, when it is known (simulations). Trackers never see it.
     pub truth: Option<Arc<str>>,
+}
+
+impl Detection {
+    /// A detection at the time of its scan, without anything that need not be known.
+    pub fn new(id: u64, observation: Observation) -> Self {
+        Detection { id, time: None, observation, noise: Noise::default(), identity: None, truth: None }
+    }
+}
+
+impl Scan {
+    /// A scan by a sensor whose place does not come with the data.
+    pub fn new(time: f64, sensor: impl Into<Arc<str>>, detections: Vec<Detection>) -> Self {
+        Scan { time, sensor: sensor.into(), position: None, velocity: None, detections }
+    }
+}
+
+/// What a recording was before it became a table: what is needed to track the table as the original.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Description {
+    /// Name of the source, as `--from` takes it: `ais`, `adsb`, `autoferry`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// What is known of the sensors, by name.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub sensors: BTreeMap<String, SensorDescription>,
+}
+
+/// What a recording says of one of its sensors.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorDescription {
+    /// Each detection is a report that one object made of itself, and says nothing of others (AIS, ADS-B, GPS).
+    pub reports: bool,
+    /// Its detections carry an identity.
+    pub identity: bool,
+    /// Median time between scans; for reports, between those of one object, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval: Option<f64>,
+}
+
+impl Description {
+    /// True when nothing is known.
+    pub fn is_empty(&self) -> bool {
+        *self == Description::default()
+    }
 }
 
 /// The measured components.

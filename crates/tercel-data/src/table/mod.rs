@@ -5,7 +5,7 @@ mod metric;
 mod track;
 mod truth;
 
-pub use detection::{Detection, Detections, Noise, Observation, Scan};
+pub use detection::{Description, Detection, Detections, Noise, Observation, Scan, SensorDescription};
 pub use metric::{Metric, Metrics};
 pub use track::{Status, Track, Tracks};
 pub use truth::{Truth, Truths};

@@ -39,6 +39,8 @@ pub struct Track {
     pub modes: Vec<f64>,
     /// Extent of the object: semi-axes (m) and orientation of the first (rad), if it is estimated.
     pub extent: Option<[f64; 3]>,
+    /// What the object is called, where sensors said so.
+    pub identity: Option<std::sync::Arc<str>>,
     /// The detection that updated the track in this scan, if one did.
     pub detection: Option<u64>,
 }

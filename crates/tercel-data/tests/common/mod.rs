@@ -7,8 +7,8 @@ use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 use tercel_data::table::{
-    Detection, Detections, Metric, Metrics, Noise, Observation, Origin, Scan, Status, Track, Tracks, Truth,
-    Truths,
+    Description, Detection, Detections, Metric, Metrics, Noise, Observation, Origin, Scan, Status, Track,
+    Tracks, Truth, Truths,
 };
 
 /// Any finite number, subnormal ones and both zeros included.
@@ -49,22 +49,32 @@ fn noise() -> impl Strategy<Value = Noise> {
 }
 
 fn scan() -> impl Strategy<Value = Scan> {
-    let detection = (observation(), noise(), option::of(name()))
-        .prop_map(|(observation, noise, truth)| Detection { id: 0, observation, noise, truth });
-    let place = option::of(proptest::array::uniform3(finite()));
-    (finite(), name(), place, vec(detection, 0..4)).prop_map(|(time, sensor, position, detections)| Scan {
-        time,
-        sensor,
-        position,
-        detections,
-    })
+    let detection = (observation(), noise(), option::of(name()), option::of(name())).prop_map(
+        |(observation, noise, identity, truth)| Detection {
+            noise,
+            identity,
+            truth,
+            ..Detection::new(0, observation)
+        },
+    );
+    let triple = || option::of(proptest::array::uniform3(finite()));
+    // The time of a scan is that of its last detection, so one has none of its own.
+    let ages = vec(option::of(1.0..10.0), 3);
+    (-1e9..1e9, name(), triple(), triple(), vec(detection, 0..4), ages).prop_map(
+        |(time, sensor, position, velocity, mut detections, ages)| {
+            for (detection, age) in detections.iter_mut().skip(1).zip(ages) {
+                detection.time = age.map(|age: f64| time - age);
+            }
+            Scan { time, sensor, position, velocity, detections }
+        },
+    )
 }
 
 pub fn detections() -> impl Strategy<Value = Detections> {
     (origin(), vec(scan(), 0..6), any::<u32>(), 1..1000_u64).prop_map(|(origin, mut scans, first, step)| {
         let detections = scans.iter_mut().flat_map(|scan| &mut scan.detections);
         detections.enumerate().for_each(|(i, detection)| detection.id = u64::from(first) + i as u64 * step);
-        Detections { origin, scans }
+        Detections { origin, scans, description: Description::default() }
     })
 }
 
@@ -102,8 +112,15 @@ fn track(n: usize, modes: usize) -> impl Strategy<Value = Track> {
     let covariance = prop_oneof![Just(Vec::new()), vec(finite(), n * (n + 1) / 2)];
     let head = (finite(), prop_oneof![name(), Just("".into())], any::<u64>(), status, 0.0..=1.0);
     let state = (vec(finite(), n), covariance, vec(0.0..=1.0, modes));
-    (head, state, option::of(extent), option::of(any::<u64>())).prop_map(
-        |((time, sensor, track, status, existence), (state, covariance, modes), extent, detection)| Track {
+    let name = option::of(name());
+    (head, state, option::of(extent), name, option::of(any::<u64>())).prop_map(
+        |(
+            (time, sensor, track, status, existence),
+            (state, covariance, modes),
+            extent,
+            identity,
+            detection,
+        )| Track {
             time,
             sensor,
             track,
@@ -113,6 +130,7 @@ fn track(n: usize, modes: usize) -> impl Strategy<Value = Track> {
             covariance,
             modes,
             extent,
+            identity,
             detection,
         },
     )

@@ -26,19 +26,22 @@ pub fn detections(recording: &Recording) -> Detections {
     };
     let scan = |(step, plot): (usize, &Option<nalgebra::Vector2<f64>>)| {
         let detection = |plot: &nalgebra::Vector2<f64>| Detection {
-            id: step as u64,
-            observation: Observation::Polar { range: Some(plot.x), bearing: plot.y, range_rate: None },
             noise,
             truth: Some(object.clone()),
+            ..Detection::new(
+                step as u64,
+                Observation::Polar { range: Some(plot.x), bearing: plot.y, range_rate: None },
+            )
         };
         Scan {
             time: step as f64 * recording.flight.interval(),
             sensor: sensor.clone(),
             position: Some([0.0; 3]),
+            velocity: None,
             detections: plot.as_ref().map(detection).into_iter().collect(),
         }
     };
-    Detections { origin: None, scans: recording.plots.iter().enumerate().map(scan).collect() }
+    Detections { scans: recording.plots.iter().enumerate().map(scan).collect(), ..Detections::default() }
 }
 
 /// Where the aircraft was.
@@ -75,6 +78,7 @@ pub fn tracks(recording: &Recording, estimates: &[StepEstimate], track: u64) -> 
             covariance: estimate.covariance.as_ref().map(upper).unwrap_or_default(),
             modes: estimate.manoeuvres.filter(|_| told).map_or(Vec::new(), |chances| chances.to_vec()),
             extent: None,
+            identity: None,
             detection: plot.is_some().then_some(step as u64),
         }
     };

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tercel_core::multi::Status;
-use tercel_data::table::{Detection, Detections, Noise, Observation, Scan, Track, Tracks, Truth, Truths};
+use tercel_data::table::{Detection, Detections, Observation, Scan, Track, Tracks, Truth, Truths};
 
 use super::{Recording, Reported};
 
@@ -23,18 +23,13 @@ pub fn detections(recording: &Recording) -> Detections {
         let mut detections = Vec::with_capacity(plots.len());
         for plot in plots {
             let observation = Observation::Position { x: plot.position.x, y: plot.position.y, z: None };
-            detections.push(Detection {
-                id,
-                observation,
-                noise: Noise::default(),
-                truth: plot.object.map(name_of),
-            });
+            detections.push(Detection { truth: plot.object.map(name_of), ..Detection::new(id, observation) });
             id += 1;
         }
         let time = step as f64 * recording.scene.interval();
-        scans.push(Scan { time, sensor: sensor.clone(), position: None, detections });
+        scans.push(Scan::new(time, sensor.clone(), detections));
     }
-    Detections { origin: None, scans }
+    Detections { scans, ..Detections::default() }
 }
 
 /// Where the objects were.
@@ -68,6 +63,7 @@ pub fn tracks(recording: &Recording, reported: &[Vec<Reported>], first: u64) -> 
             covariance: Vec::new(),
             modes: Vec::new(),
             extent: None,
+            identity: None,
             detection: None,
         }));
     }

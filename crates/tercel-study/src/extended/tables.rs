@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector2;
 use tercel_core::extended::Ellipse;
 use tercel_core::multi::Status;
-use tercel_data::table::{Detection, Detections, Noise, Observation, Scan, Track, Tracks, Truth, Truths};
+use tercel_data::table::{Detection, Detections, Observation, Scan, Track, Tracks, Truth, Truths};
 use tercel_sim::extended::Ride;
 
 /// Name of the sensor in the tables.
@@ -22,15 +22,13 @@ pub(crate) fn detections<'a>(
     let mut ids = 0..;
     let scans = scans.enumerate().map(|(step, points)| {
         let detections = points.iter().zip(&mut ids).map(|(point, id)| Detection {
-            id,
-            observation: Observation::Position { x: point.x, y: point.y, z: None },
-            noise: Noise::default(),
             truth: object.clone(),
+            ..Detection::new(id, Observation::Position { x: point.x, y: point.y, z: None })
         });
         let detections = detections.collect();
-        Scan { time: step as f64 * interval, sensor: sensor.clone(), position: None, detections }
+        Scan::new(step as f64 * interval, sensor.clone(), detections)
     });
-    Detections { origin: None, scans: scans.collect() }
+    Detections { scans: scans.collect(), ..Detections::default() }
 }
 
 /// The first steps of rides, each with a name.
@@ -72,6 +70,7 @@ pub(crate) fn row(time: f64, track: u64, place: Vector2<f64>, ellipse: Option<&E
         covariance: Vec::new(),
         modes: Vec::new(),
         extent: ellipse.map(extent),
+        identity: None,
         detection: None,
     }
 }

@@ -1,8 +1,6 @@
 //! What every report holds to, whatever the tables hold.
 
-use tercel_data::table::{
-    Detection, Detections, Noise, Observation, Scan, Status, Track, Tracks, Truth, Truths,
-};
+use tercel_data::table::{Detection, Detections, Observation, Scan, Status, Track, Tracks, Truth, Truths};
 
 use super::*;
 
@@ -10,9 +8,9 @@ const ATTACK: &str = "</script><script>alert(1)</script><img src=x onerror=alert
 
 fn detections(name: &str, x: f64) -> Detections {
     let observation = Observation::Position { x, y: 2.0, z: None };
-    let detection = Detection { id: 1, observation, noise: Noise::default(), truth: Some(name.into()) };
-    let scan = Scan { time: 1.0, sensor: name.into(), position: None, detections: vec![detection] };
-    Detections { origin: None, scans: vec![scan] }
+    let detection = Detection { truth: Some(name.into()), ..Detection::new(1, observation) };
+    let scan = Scan::new(1.0, name, vec![detection]);
+    Detections { scans: vec![scan], ..Detections::default() }
 }
 
 fn tracks(name: &str, number: f64) -> Tracks {
@@ -26,6 +24,7 @@ fn tracks(name: &str, number: f64) -> Tracks {
         covariance: vec![number; 10],
         modes: vec![number],
         extent: Some([number; 3]),
+        identity: None,
         detection: Some(1),
     };
     let labels = ["x", "y", "vx", "vy"].map(String::from).to_vec();

@@ -3,9 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use tercel_data::table::{
-    Detection, Detections, Noise, Observation, Scan, Status, Track, Tracks, Truth, Truths,
-};
+use tercel_data::table::{Detection, Detections, Observation, Scan, Status, Track, Tracks, Truth, Truths};
 use tercel_study::report::{Chart, Form, Picture, Report, ReportError, SensorNote, Summary};
 
 /// How much there is of everything.
@@ -177,12 +175,12 @@ impl Making {
     fn detection(&mut self, observation: Observation, boat: Option<usize>) -> Detection {
         self.next += 1;
         let truth = boat.map(|i| self.boats[i].name.clone());
-        Detection { id: self.next - 1, observation, noise: Noise::default(), truth }
+        Detection { truth, ..Detection::new(self.next - 1, observation) }
     }
 
     fn scan(&mut self, time: f64, sensor: &str, own: [f64; 2], detections: Vec<Detection>) {
         let position = Some([own[0], own[1], 0.0]);
-        self.scene.detections.scans.push(Scan { time, sensor: sensor.into(), position, detections });
+        self.scene.detections.scans.push(Scan { position, ..Scan::new(time, sensor, detections) });
     }
 
     /// A track that follows its boat with the errors of a fair filter.
@@ -207,6 +205,7 @@ impl Making {
             covariance: covariance(sigma, y.atan2(x)),
             modes: vec![1.0 - turning, turning],
             extent: None,
+            identity: None,
             detection,
         });
     }
@@ -229,6 +228,7 @@ impl Making {
                     covariance: covariance(14.0, 0.0),
                     modes: vec![0.5, 0.5],
                     extent: None,
+                    identity: None,
                     detection: None,
                 });
             }

@@ -185,28 +185,22 @@ impl Place {
 
 #[cfg(test)]
 mod tests {
-    use tercel_data::table::Noise;
-
     use super::*;
 
     fn scan(time: f64, observations: &[Observation]) -> Scan {
-        let detection = |(id, &observation): (usize, &Observation)| Detection {
-            id: id as u64,
-            observation,
-            noise: Noise::default(),
-            truth: None,
-        };
+        let detection = |(id, &observation): (usize, &Observation)| Detection::new(id as u64, observation);
         Scan {
             time,
             sensor: "radar".into(),
             position: Some([100.0, 50.0, 0.0]),
+            velocity: None,
             detections: observations.iter().enumerate().map(detection).collect(),
         }
     }
 
     fn plots(scans: Vec<Scan>, limit: usize) -> (serde_json::Value, Vec<String>) {
         let mut remarks = Vec::new();
-        let plots = Plots::of(&Detections { origin: None, scans }, &[], 0.0, limit, &mut remarks);
+        let plots = Plots::of(&Detections { scans, ..Detections::default() }, &[], 0.0, limit, &mut remarks);
         (serde_json::to_value(plots).unwrap(), remarks)
     }
 
