@@ -8,6 +8,7 @@
 //! | [`Imm`] | one belief and one probability per mode | motion that changes between models |
 //! | [`Particle`] | weighted states | any motion, any sensor |
 //! | [`RaoBlackwellised`] | weighted histories of the motion, a Gaussian for each | motion whose parameters jump: the limit of what can be known |
+//! | [`Identified`] | that of any filter, and what the object is called | measurements that bring identities |
 //! | [`Padded`] | Gaussian | a model with a smaller state beside one with a larger |
 
 mod correction;
@@ -15,6 +16,7 @@ mod either;
 mod estimate;
 mod extended;
 mod gaussian;
+mod identified;
 mod imm;
 mod innovation;
 mod jump_markov;
@@ -38,6 +40,7 @@ pub(crate) use correction::{Comparison, predicted};
 pub use either::Either;
 pub use estimate::Estimate;
 pub use extended::Extended;
+pub use identified::{Identified, Identity, Named, NamedBelief};
 pub use imm::{Imm, ImmBelief};
 pub use innovation::Innovation;
 pub use jump_markov::JumpMarkov;
@@ -179,6 +182,16 @@ pub trait Filter<const N: usize> {
         (intensity * self.area(measurement)).ln()
     }
 
+    /// What the measurement says that its object is called, in filters that weigh [identities](Identified).
+    fn identity(&self, _measurement: &Self::Measurement) -> Option<Identity> {
+        None
+    }
+
+    /// What the object of this belief is called, if that is known; see [`identity`](Filter::identity).
+    fn called(&self, _belief: &Self::Belief) -> Option<Identity> {
+        None
+    }
+
     /// Moves many beliefs forward. Filters that work faster on batches override it.
     fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
         for belief in beliefs {
@@ -285,6 +298,12 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
     }
     fn ln_clutter(&self, measurement: &Self::Measurement, intensity: f64) -> f64 {
         (**self).ln_clutter(measurement, intensity)
+    }
+    fn identity(&self, measurement: &Self::Measurement) -> Option<Identity> {
+        (**self).identity(measurement)
+    }
+    fn called(&self, belief: &Self::Belief) -> Option<Identity> {
+        (**self).called(belief)
     }
     fn predict_all(&self, beliefs: &mut [&mut Self::Belief], dt: f64) {
         (**self).predict_all(beliefs, dt);

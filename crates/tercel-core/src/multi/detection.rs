@@ -4,7 +4,10 @@ use nalgebra::Vector2;
 
 use crate::error::FilterError;
 
-/// Probability that a scan holds a measurement of an object that is there.
+/// Probability that a scan holds a measurement of an object that is there, and what it means when it holds none.
+///
+/// A sensor that *scans* looks once at its field of view, so an object that gave no measurement was missed. *Reports* are
+/// what objects say of themselves (AIS, ADS-B, GPS): each speaks of one object, and the silence of the others means nothing.
 ///
 /// ```
 /// use tercel_core::multi::Detection;
@@ -21,6 +24,7 @@ pub struct Detection {
     /// Ranges (rising) and the probability at each.
     table: Vec<(f64, f64)>,
     position: Vector2<f64>,
+    reports: bool,
 }
 
 impl Detection {
@@ -30,6 +34,16 @@ impl Detection {
     /// When it is not between 0 and 1.
     pub fn uniform(probability: f64) -> Result<Self, FilterError> {
         Detection::by_range(vec![(0.0, probability)])
+    }
+
+    /// Of reports: every measurement speaks of one object, and none is missed.
+    pub fn reports() -> Self {
+        Detection { table: vec![(0.0, 1.0)], position: Vector2::zeros(), reports: true }
+    }
+
+    /// True for reports.
+    pub fn is_reports(&self) -> bool {
+        self.reports
     }
 
     /// A probability that depends on the distance from the sensor: linear between the entries (range in m, probability) of
@@ -61,7 +75,7 @@ impl Detection {
                 value: pair[1].0,
                 expected: "must be above the range before it",
             }),
-            None => Ok(Detection { table, position: Vector2::zeros() }),
+            None => Ok(Detection { table, position: Vector2::zeros(), reports: false }),
         }
     }
 
@@ -87,6 +101,21 @@ impl Detection {
             }
         }
     }
+
+    /// How an object at `place` is seen; see [`probability`](Detection::probability).
+    pub(super) fn sight(&self, place: Option<&Vector2<f64>>) -> Sight {
+        let seen = self.probability(place);
+        Sight { seen, missed: if self.reports { 0.0 } else { seen } }
+    }
+}
+
+/// How likely an object is seen, and how much it says when it is not.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Sight {
+    /// Probability that it gives a measurement.
+    pub seen: f64,
+    /// Probability that it would have given one, when it gave none: zero when its silence means nothing.
+    pub missed: f64,
 }
 
 #[cfg(test)]

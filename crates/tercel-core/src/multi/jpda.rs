@@ -4,6 +4,7 @@ use crate::association::{Gate, Marginals};
 use crate::error::FilterError;
 use crate::filter::{Filter, Innovation};
 
+use super::detection::Sight;
 use super::individuals::Individuals;
 use super::vicinity::Vicinity;
 use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutter_at, places};
@@ -101,8 +102,8 @@ struct Scratch {
     marginals: Marginals,
     /// Track, measurement and `ln w` of the pairs in a gate, by track.
     pairs: Vec<(usize, usize, f64)>,
-    /// Detection probability of each track.
-    detection: Vec<f64>,
+    /// How each track is seen.
+    sights: Vec<Sight>,
     /// Logarithm of the clutter intensity at each measurement.
     ln_clutter: Vec<f64>,
     /// Probability that some track claims each measurement.
@@ -136,18 +137,18 @@ impl<B: Clone> Jpda<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { vicinity, innovations, marginals, pairs, detection, ln_clutter, claimed } =
+        let Scratch { vicinity, innovations, marginals, pairs, sights, ln_clutter, claimed } =
             &mut self.scratch;
         pairs.clear();
-        detection.clear();
+        sights.clear();
         ln_clutter.clear();
         ln_clutter
             .extend(scan.measurements.iter().map(|measurement| ln_clutter_at(filter, scan, measurement)));
         let mut compared: Vec<&F::Measurement> = Vec::new();
-        for (row, track) in self.objects.tracks.iter().enumerate() {
-            let (seen, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
-            detection.push(seen);
-            let prior = (track.existence * seen).ln() - (1.0 - track.existence * seen).ln();
+        for (row, track) in self.objects.active().enumerate() {
+            let (sight, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
+            sights.push(sight);
+            let prior = (track.existence * sight.seen).ln() - (1.0 - track.existence * sight.missed).ln();
             compared.clear();
             compared.extend(near.iter().map(|&column| &scan.measurements[column]));
             filter.innovations(&track.belief, &compared, innovations);
@@ -161,7 +162,7 @@ impl<B: Clone> Jpda<B> {
                 }
             }
         }
-        marginals.solve(pairs, self.objects.tracks.len(), scan.measurements.len());
+        marginals.solve(pairs, self.objects.active.len(), scan.measurements.len());
         claimed.clear();
         claimed.resize(scan.measurements.len(), 0.0);
         for (pair, probability) in pairs.iter().zip(marginals.pairs()) {
@@ -175,17 +176,20 @@ impl<B: Clone> Jpda<B> {
         F: Filter<N, Belief = B> + ?Sized,
     {
         self.objects.clear_uses(scan.measurements.len());
-        let Scratch { marginals, pairs, detection, .. } = &self.scratch;
+        let Scratch { marginals, pairs, sights, .. } = &self.scratch;
         // How probable the pair is for which each measurement counts as used.
         let mut best_use = vec![0.0; scan.measurements.len()];
         let mut parts: Vec<(f64, &F::Measurement)> = Vec::new();
         let mut first = 0;
-        for (row, track) in self.objects.tracks.iter_mut().enumerate() {
+        let Individuals { tracks, uses, active, .. } = &mut self.objects;
+        for (row, &at) in active.iter().enumerate() {
+            let track = &mut tracks[at];
             let count = pairs[first..].iter().take_while(|pair| pair.0 == row).count();
             let range = first..first + count;
             first = range.end;
-            let (seen, r) = (detection[row], track.existence);
-            let missed = marginals.misses()[row] * r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
+            let (Sight { missed: telling, .. }, r) = (sights[row], track.existence);
+            let missed =
+                marginals.misses()[row] * r * (1.0 - telling) / (1.0 - r * telling).max(f64::MIN_POSITIVE);
             let mut heaviest = (0.0, None);
             parts.clear();
             for (&(_, column, _), &probability) in pairs[range.clone()].iter().zip(&marginals.pairs()[range])
@@ -205,10 +209,10 @@ impl<B: Clone> Jpda<B> {
                     track.hit(column, scan.time);
                     if heaviest.0 > best_use[column] {
                         best_use[column] = heaviest.0;
-                        self.objects.uses[column] = Use::Updated(track.id);
+                        uses[column] = Use::Updated(track.id);
                     }
                 }
-                _ if seen > 0.0 => track.miss(),
+                _ if telling > 0.0 => track.miss(),
                 _ => track.unseen(),
             }
             self.config.management.judge(track, scan.time);
@@ -240,20 +244,25 @@ impl<B: Clone> Tracker for Jpda<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let dt = error::step(scan.time, self.time)?;
+        error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
         self.scratch.vicinity.build(&places);
-        self.objects.predict(filter, dt, self.config.survival);
+        self.objects.predict(filter, scan, self.config.survival, &self.config.management);
         self.associate(filter, scan);
         self.update(filter, scan);
         self.objects.drop_doubles(filter, self.config.merge);
         self.birth(filter, scan);
+        self.objects.name(filter);
         self.time = Some(scan.time);
         Ok(())
     }
 
     fn tracks(&self) -> &[Track<B>] {
         &self.objects.tracks
+    }
+
+    fn active(&self) -> Option<&[usize]> {
+        Some(&self.objects.active)
     }
 
     fn uses(&self) -> &[Use] {

@@ -111,6 +111,7 @@ impl<B: Clone> Roster<B> {
             if track.existence == 0.0 {
                 filter.predict(&mut track.belief, dt);
             }
+            track.time = time;
             management.judge(track, time);
         }
         self.uses.clear();

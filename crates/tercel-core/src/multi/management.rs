@@ -18,7 +18,8 @@ pub struct Management {
     pub min_existence: f64,
     /// A confirmed track with more misses in a row is deleted. Only scans that should have seen the track count.
     pub max_misses: u32,
-    /// A track that was not updated for longer is deleted, s, even if no sensor could have seen it.
+    /// A track that was not updated for longer is deleted, s, even if no sensor could have seen it; one that is updated seldom
+    /// is given four times its own interval.
     pub max_coast: f64,
 }
 
@@ -48,12 +49,15 @@ impl Default for Management {
     }
 }
 
+/// Intervals of its own for which a track may be silent.
+const PATIENCE: f64 = 4.0;
+
 impl Management {
     /// Sets the status of a track whose bookkeeping for the scan at `time` is done.
     pub(super) fn judge<B>(&self, track: &mut Track<B>, time: f64) {
         let give_up = track.existence < self.min_existence
             || track.misses > self.max_misses
-            || time - track.updated > self.max_coast
+            || self.is_overdue(track, time)
             || track.existence.is_nan()
             || track.existence <= 0.0;
         track.status = match self.confirm {
@@ -67,6 +71,12 @@ impl Management {
         if track.status == Status::Confirmed && track.misses > 0 {
             track.status = Status::Coasted;
         }
+    }
+
+    /// True when a track was silent for too long: longer than `max_coast`, and than a few times its own interval, so that an
+    /// object that is seen every quarter of an hour is not given up after ten minutes.
+    pub(super) fn is_overdue<B>(&self, track: &Track<B>, time: f64) -> bool {
+        time - track.updated > self.max_coast.max(PATIENCE * track.interval)
     }
 
     fn judge_hits<B>(track: &Track<B>, hits: u32, scans: u32) -> Status {

@@ -15,6 +15,7 @@
 
 mod clutter;
 mod detection;
+mod directory;
 mod error;
 mod individuals;
 mod jpda;
@@ -79,6 +80,12 @@ pub trait Tracker {
 
     /// The tracks after the last scan, tentative ones and those deleted in that scan included, by rising number.
     fn tracks(&self) -> &[Track<Self::Belief>];
+
+    /// Which of the [`tracks`](Tracker::tracks) the last scan concerned, by their places there; nothing when it concerned all.
+    /// A report concerns the few tracks that may have made it; the beliefs of the others stay at the times of their own.
+    fn active(&self) -> Option<&[usize]> {
+        None
+    }
 
     /// What became of each measurement of the last scan.
     fn uses(&self) -> &[Use];

@@ -123,6 +123,8 @@ struct Scratch<B> {
     vicinity: Vicinity,
     reduction: Reduction<B, ()>,
     measured: Vec<Measured<B>>,
+    /// Of reports: object, measurement, and the object's part in it.
+    claims: Vec<(usize, usize, f64)>,
     /// How far nothing explains each measurement, 0 to 1.
     unexplained: Vec<f64>,
 }
@@ -157,6 +159,7 @@ impl<B> MultiBernoulli<B> {
             vicinity: Vicinity::default(),
             reduction: Reduction::default(),
             measured: Vec::new(),
+            claims: Vec::new(),
             unexplained: Vec::new(),
         };
         Ok(MultiBernoulli { config, objects: Vec::new(), roster: Roster::default(), time: None, scratch })
@@ -187,17 +190,19 @@ impl<B: Clone> MultiBernoulli<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { vicinity, measured, .. } = &mut self.scratch;
+        let Scratch { vicinity, measured, claims, .. } = &mut self.scratch;
         measured.clear();
+        claims.clear();
+        let reports = scan.detection.is_reports();
         let empty = || Measured { numerator: 0.0, denominator: 0.0, label: None, beliefs: Vec::new() };
         measured.resize_with(scan.measurements.len(), empty);
-        for object in &mut self.objects {
+        for (at, object) in self.objects.iter_mut().enumerate() {
             let r = object.existence;
             let mut pairs: Vec<(usize, Term<B, ()>)> = Vec::new();
             let mut detected = 0.0;
             for term in &mut object.beliefs {
-                let (detection, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
-                detected += term.weight * detection;
+                let (sight, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
+                detected += term.weight * sight.missed;
                 for &number in near {
                     let mut belief = term.belief.clone();
                     // A pair whose update fails numerically is a pair outside the gate.
@@ -205,19 +210,24 @@ impl<B: Clone> MultiBernoulli<B> {
                         continue;
                     };
                     let ln_clutter = ln_clutter_at(filter, scan, &scan.measurements[number]);
-                    let weight = detection * term.weight * ratio(innovation.log_likelihood - ln_clutter);
+                    let weight = sight.seen * term.weight * ratio(innovation.log_likelihood - ln_clutter);
                     if self.config.gate.contains(&innovation) && weight.is_finite() {
                         pairs.push((number, Term { weight, belief, tag: () }));
                     }
                 }
-                term.weight *= 1.0 - detection;
+                term.weight *= 1.0 - sight.missed;
             }
             let left = 1.0 - r * detected;
             object.label = Label { id: object.label.id, measurement: None, in_view: detected > 0.0 };
             for (number, mut term) in pairs {
                 let pool = &mut measured[number];
-                pool.numerator += r * (1.0 - r) * term.weight / (left * left);
-                pool.denominator += r * term.weight / left;
+                let part = r * term.weight / left;
+                pool.denominator += part;
+                // An object reports or it does not: what it reported is not there a second time, unreported.
+                pool.numerator += if reports { part } else { part * (1.0 - r) / left };
+                if reports {
+                    claims.push((at, number, part));
+                }
                 term.weight *= r / (1.0 - r);
                 pool.claim(term.weight, &object.label);
                 pool.beliefs.push(term);
@@ -232,7 +242,11 @@ impl<B: Clone> MultiBernoulli<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { reduction, measured, unexplained, .. } = &mut self.scratch;
+        let Scratch { reduction, measured, claims, unexplained, .. } = &mut self.scratch;
+        for &(object, number, part) in &*claims {
+            let object = &mut self.objects[object];
+            object.existence = (object.existence - part / (1.0 + measured[number].denominator)).max(0.0);
+        }
         unexplained.clear();
         for (number, mut pool) in measured.drain(..).enumerate() {
             // Relative to the clutter at the measurement, whose own share is then one.

@@ -4,6 +4,7 @@ use crate::association::{AssignmentSolver, Gate};
 use crate::error::FilterError;
 use crate::filter::Filter;
 
+use super::detection::Sight;
 use super::individuals::Individuals;
 use super::vicinity::Vicinity;
 use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutter_at, places, ratio};
@@ -97,8 +98,8 @@ struct Scratch {
     pairs: Vec<(usize, usize, f64)>,
     /// Cost of leaving each track alone.
     misses: Vec<f64>,
-    /// Detection probability of each track.
-    detection: Vec<f64>,
+    /// How each track is seen.
+    sights: Vec<Sight>,
     columns: Vec<Option<usize>>,
 }
 
@@ -125,21 +126,21 @@ impl<B: Clone> NearestNeighbour<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { vicinity, solver, pairs, misses, detection, columns } = &mut self.scratch;
+        let Scratch { vicinity, solver, pairs, misses, sights, columns } = &mut self.scratch;
         pairs.clear();
         misses.clear();
-        detection.clear();
-        for (row, track) in self.objects.tracks.iter().enumerate() {
-            let (seen, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
-            detection.push(seen);
-            misses.push(-(1.0 - track.existence * seen).max(f64::MIN_POSITIVE).ln());
+        sights.clear();
+        for (row, track) in self.objects.active().enumerate() {
+            let (sight, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
+            sights.push(sight);
+            misses.push(-(1.0 - track.existence * sight.missed).max(f64::MIN_POSITIVE).ln());
             for &column in near {
                 // A pair that cannot be compared numerically is a pair outside the gate.
                 let Ok(innovation) = filter.innovation(&track.belief, &scan.measurements[column]) else {
                     continue;
                 };
                 let clutter = ln_clutter_at(filter, scan, &scan.measurements[column]);
-                let cost = -(track.existence * seen).ln() - innovation.log_likelihood + clutter;
+                let cost = -(track.existence * sight.seen).ln() - innovation.log_likelihood + clutter;
                 if self.config.gate.contains(&innovation) && cost.is_finite() {
                     pairs.push((row, column, cost));
                 }
@@ -149,7 +150,7 @@ impl<B: Clone> NearestNeighbour<B> {
         match solver.solve_sparse(pairs, scan.measurements.len(), misses) {
             Ok(best) => columns.extend_from_slice(&best.columns),
             // All costs are finite and every track may stay alone, so there is always an answer.
-            Err(_) => columns.resize(self.objects.tracks.len(), None),
+            Err(_) => columns.resize(self.objects.active.len(), None),
         }
     }
 
@@ -159,9 +160,10 @@ impl<B: Clone> NearestNeighbour<B> {
         F: Filter<N, Belief = B> + ?Sized,
     {
         self.objects.clear_uses(scan.measurements.len());
-        let Individuals { tracks, uses, .. } = &mut self.objects;
-        for (row, track) in tracks.iter_mut().enumerate() {
-            let (seen, r) = (self.scratch.detection[row], track.existence);
+        let Individuals { tracks, uses, active, .. } = &mut self.objects;
+        for (row, &at) in active.iter().enumerate() {
+            let track = &mut tracks[at];
+            let (Sight { seen, missed }, r) = (self.scratch.sights[row], track.existence);
             let number = self.scratch.columns[row];
             let paired = number.and_then(|number| {
                 let measurement = &scan.measurements[number];
@@ -171,13 +173,13 @@ impl<B: Clone> NearestNeighbour<B> {
             });
             match paired {
                 Some((number, ratio)) => {
-                    let l = 1.0 - seen + seen * ratio;
+                    let l = 1.0 - missed + seen * ratio;
                     track.existence = r * l / (1.0 - r + r * l);
                     track.hit(number, scan.time);
                     uses[number] = Use::Updated(track.id);
                 }
-                None if seen > 0.0 => {
-                    track.existence = r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
+                None if missed > 0.0 => {
+                    track.existence = r * (1.0 - missed) / (1.0 - r * missed).max(f64::MIN_POSITIVE);
                     track.miss();
                 }
                 None => track.unseen(),
@@ -198,21 +200,26 @@ impl<B: Clone> Tracker for NearestNeighbour<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let dt = error::step(scan.time, self.time)?;
+        error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
         self.scratch.vicinity.build(&places);
-        self.objects.predict(filter, dt, self.config.survival);
+        self.objects.predict(filter, scan, self.config.survival, &self.config.management);
         self.assign(filter, scan);
         self.update(filter, scan);
         self.objects.drop_doubles(filter, self.config.merge);
         self.objects.birth(filter, scan, self.config.birth, &self.config.management, |_| 1.0);
         self.objects.drop_weakest(self.config.cap);
+        self.objects.name(filter);
         self.time = Some(scan.time);
         Ok(())
     }
 
     fn tracks(&self) -> &[Track<B>] {
         &self.objects.tracks
+    }
+
+    fn active(&self) -> Option<&[usize]> {
+        Some(&self.objects.active)
     }
 
     fn uses(&self) -> &[Use] {

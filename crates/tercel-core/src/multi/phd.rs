@@ -114,6 +114,8 @@ struct Scratch<B> {
     vicinity: Vicinity,
     reduction: Reduction<B, Label>,
     children: Vec<Labelled<B>>,
+    /// The term from which each child comes.
+    parents: Vec<usize>,
     /// Sum of the detection terms of each measurement, then its whole denominator, relative to its clutter.
     explained: Vec<f64>,
 }
@@ -132,6 +134,7 @@ impl<B> Phd<B> {
             vicinity: Vicinity::default(),
             reduction: Reduction::default(),
             children: Vec::new(),
+            parents: Vec::new(),
             explained: Vec::new(),
         };
         Ok(Phd { config, terms: Vec::new(), roster: Roster::default(), time: None, scratch })
@@ -162,13 +165,14 @@ impl<B: Clone> Phd<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { vicinity, children, explained, .. } = &mut self.scratch;
+        let Scratch { vicinity, children, parents, explained, .. } = &mut self.scratch;
         children.clear();
         explained.clear();
         explained.resize(scan.measurements.len(), 0.0);
-        for term in &mut self.terms {
-            let (detection, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
-            term.tag = Label { id: term.tag.id, measurement: None, in_view: detection > 0.0 };
+        parents.clear();
+        for (row, term) in self.terms.iter_mut().enumerate() {
+            let (sight, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
+            term.tag = Label { id: term.tag.id, measurement: None, in_view: sight.missed > 0.0 };
             for &number in near {
                 let mut belief = term.belief.clone();
                 // A pair whose update fails numerically is a pair outside the gate.
@@ -178,21 +182,27 @@ impl<B: Clone> Phd<B> {
                 }
                 let ln_ratio =
                     innovation.log_likelihood - ln_clutter_at(filter, scan, &scan.measurements[number]);
-                let weight = detection * term.weight * ratio(ln_ratio);
+                let weight = sight.seen * term.weight * ratio(ln_ratio);
                 explained[number] += weight;
                 let tag = Label { measurement: Some(number), ..term.tag };
                 children.push(Term { weight, belief, tag });
+                parents.push(row);
             }
-            term.weight *= 1.0 - detection;
+            term.weight *= 1.0 - sight.missed;
         }
         // Everything is relative to the clutter at the measurement, whose own share is then one.
         explained.iter_mut().for_each(|sum| *sum += 1.0);
-        self.terms.append(children);
-        for term in &mut self.terms {
-            if let Some(number) = term.tag.measurement {
-                term.weight /= explained[number];
+        for (child, &parent) in children.iter_mut().zip(&*parents) {
+            if let Some(number) = child.tag.measurement {
+                child.weight /= explained[number];
+            }
+            // An object reports or it does not: what it reported is not there a second time, unreported.
+            if scan.detection.is_reports() {
+                let term = &mut self.terms[parent];
+                term.weight = (term.weight - child.weight).max(0.0);
             }
         }
+        self.terms.append(children);
         self.terms.retain(|term| term.weight > self.config.prune);
     }
 

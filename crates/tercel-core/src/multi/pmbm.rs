@@ -219,6 +219,7 @@ impl<B: Clone> Pmbm<B> {
         self.tracks.append(&mut fresh);
         self.drop_weakest();
         for track in &mut self.tracks {
+            track.time = scan.time;
             self.config.management.judge(track, scan.time);
             let Some(number) = track.measurement else { continue };
             if track.existence > claims[number] {
@@ -270,7 +271,10 @@ impl<B: Clone> Tracker for Pmbm<B> {
         self.scratch.vicinity.build(&places);
         self.predict(filter, dt);
         self.update(filter, scan, &places);
-        self.undetected.seen(scan.detection);
+        // That nobody reported says nothing of those who were never seen.
+        if !scan.detection.is_reports() {
+            self.undetected.seen(scan.detection);
+        }
         self.read(filter, scan, dt);
         self.time = Some(scan.time);
         Ok(())

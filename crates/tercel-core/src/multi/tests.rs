@@ -1,5 +1,7 @@
 //! What is true of every tracker.
 
+mod reports;
+
 use super::*;
 use crate::filter::{Extended, Kalman};
 use crate::motion::ConstantVelocity;

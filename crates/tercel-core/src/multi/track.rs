@@ -1,5 +1,7 @@
 //! What a tracker reports.
 
+use crate::filter::Identity;
+
 /// Number of a track: unique in the life of its tracker.
 pub type TrackId = u64;
 
@@ -24,12 +26,21 @@ pub struct Track<B> {
     pub started: f64,
     /// Time of the last scan that updated it, s.
     pub updated: f64,
+    /// Time of its belief, s: that of the last scan that concerned it.
+    pub time: f64,
+    /// Mean time between the scans that updated it, the last ones counting most, s; zero before the second.
+    pub interval: f64,
+    /// What the object is called, if that is known.
+    pub(super) identity: Option<Identity>,
     /// Whether each of the last 64 scans in view updated it; the newest in the lowest bit.
     pub(super) history: u64,
     /// Scans in view, at most 64.
     pub(super) seen: u32,
     pub(super) confirmed: bool,
 }
+
+/// Share of the newest of the intervals in their mean.
+const NEWEST: f64 = 0.25;
 
 impl<B> Track<B> {
     /// A tentative track, just started by a measurement.
@@ -44,6 +55,9 @@ impl<B> Track<B> {
             misses: 0,
             started: time,
             updated: time,
+            time,
+            interval: 0.0,
+            identity: None,
             history: 1,
             seen: 1,
             confirmed: false,
@@ -55,6 +69,8 @@ impl<B> Track<B> {
         self.measurement = Some(measurement);
         self.hits = self.hits.saturating_add(1);
         self.misses = 0;
+        let passed = time - self.updated;
+        self.interval += (passed - self.interval) * if self.hits <= 2 { 1.0 } else { NEWEST };
         self.updated = time;
         self.history = self.history << 1 | 1;
         self.seen = (self.seen + 1).min(64);

@@ -3,6 +3,7 @@
 use nalgebra::Vector2;
 
 use super::Scan;
+use super::detection::Sight;
 use crate::association::{Gate, PlaceIndex};
 use crate::filter::Filter;
 
@@ -19,7 +20,7 @@ impl Vicinity {
         self.index.build(places);
     }
 
-    /// Probability that the sensor sees the object of this belief, and the measurements that may lie inside its gate, by
+    /// How the sensor sees the object of this belief, and the measurements that may lie inside its gate, by
     /// rising number: none where the sensor cannot see it.
     pub fn look<const N: usize, F>(
         &mut self,
@@ -27,19 +28,19 @@ impl Vicinity {
         belief: &F::Belief,
         scan: &Scan<'_, F::Measurement>,
         gate: &Gate,
-    ) -> (f64, &[usize])
+    ) -> (Sight, &[usize])
     where
         F: Filter<N> + ?Sized,
     {
         let reach = filter.reach(belief);
-        let detection = scan.detection.probability(reach.as_ref().map(|(centre, _)| centre));
+        let sight = scan.detection.sight(reach.as_ref().map(|(centre, _)| centre));
         match reach {
-            _ if detection == 0.0 => self.near.clear(),
+            _ if sight.seen == 0.0 => self.near.clear(),
             Some((centre, spread)) => {
                 self.index.near(&centre, &spread, gate.search_limit(), &mut self.near);
             }
             None => self.near.splice(.., 0..scan.measurements.len()).for_each(drop),
         }
-        (detection, &self.near)
+        (sight, &self.near)
     }
 }
