@@ -208,6 +208,10 @@ impl<const K: usize, const N: usize, const M: usize> Sensor<K, M> for Shortened<
         self.sensor.footprint(&lengthened(state))
     }
 
+    fn axes(&self) -> usize {
+        self.sensor.axes()
+    }
+
     fn area(&self, measurement: &Measurement<M>) -> f64 {
         self.sensor.area(measurement)
     }

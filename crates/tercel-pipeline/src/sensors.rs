@@ -123,7 +123,7 @@ pub(crate) fn positions(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineErro
     collect(scan, "position", "polar", |detection| match detection.observation {
         Observation::Position { x, y, .. } => {
             let noise = diagonal([detection.noise.x, detection.noise.y]);
-            Some(Measurement { value: vector![x, y], noise })
+            Some(Measurement { value: vector![x, y], noise, age: 0.0 })
         }
         Observation::Polar { .. } => None,
     })
@@ -134,7 +134,7 @@ pub(crate) fn ranges(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> 
     collect(scan, "range and bearing", "position", |detection| match detection.observation {
         Observation::Polar { range: Some(range), bearing, .. } => {
             let noise = diagonal([detection.noise.range, detection.noise.bearing]);
-            Some(Measurement { value: vector![range, bearing], noise })
+            Some(Measurement { value: vector![range, bearing], noise, age: 0.0 })
         }
         _ => None,
     })
@@ -146,7 +146,7 @@ pub(crate) fn range_rates(scan: &Scan) -> Result<Vec<Measurement<3>>, PipelineEr
         Observation::Polar { range: Some(range), bearing, range_rate: Some(rate) } => {
             let noise =
                 diagonal([detection.noise.range, detection.noise.bearing, detection.noise.range_rate]);
-            Some(Measurement { value: vector![range, bearing, rate], noise })
+            Some(Measurement { value: vector![range, bearing, rate], noise, age: 0.0 })
         }
         _ => None,
     })
@@ -155,9 +155,11 @@ pub(crate) fn range_rates(scan: &Scan) -> Result<Vec<Measurement<3>>, PipelineEr
 /// The detections of a scan as bearings.
 pub(crate) fn bearings(scan: &Scan) -> Result<Vec<Measurement<1>>, PipelineError> {
     collect(scan, "bearing", "position", |detection| match detection.observation {
-        Observation::Polar { bearing, .. } => {
-            Some(Measurement { value: vector![bearing], noise: diagonal([detection.noise.bearing]) })
-        }
+        Observation::Polar { bearing, .. } => Some(Measurement {
+            value: vector![bearing],
+            noise: diagonal([detection.noise.bearing]),
+            age: 0.0,
+        }),
         Observation::Position { .. } => None,
     })
 }

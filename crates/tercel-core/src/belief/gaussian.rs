@@ -103,6 +103,19 @@ impl<const N: usize> Gaussian<N> {
             + difference * difference.transpose() * (share * (1.0 - share));
     }
 
+    /// The same object `seconds` later, where its `axes` positions have moved on with the `axes` velocities that follow them, and
+    /// nothing else has changed. A state without velocities stays where it is.
+    pub fn moved_on(&self, axes: usize, seconds: f64) -> Gaussian<N> {
+        if seconds == 0.0 || N < 2 * axes {
+            return *self;
+        }
+        let mut shift = SMatrix::<f64, N, N>::identity();
+        for i in 0..axes {
+            shift[(i, i + axes)] = seconds;
+        }
+        Gaussian { mean: shift * self.mean, covariance: shift * self.covariance * shift.transpose() }
+    }
+
     /// The first `K` components, as the belief of a smaller state.
     ///
     /// A `K` above `N` does not compile.

@@ -6,10 +6,12 @@ use super::Innovation;
 use crate::belief::{Cholesky, Gaussian, positive};
 use crate::error::FilterError;
 use crate::motion::Motion;
-use crate::sensor::{Measurement, Reading, Sensor};
+use crate::sensor::{Aged, Measurement, Reading, Sensor};
 
 /// A measurement compared with a Gaussian belief through a linearised sensor.
 pub(crate) struct Comparison<const N: usize, const M: usize> {
+    /// Of the measurement, s.
+    age: f64,
     residual: SVector<f64, M>,
     noise: SMatrix<f64, M, M>,
     jacobian: SMatrix<f64, M, N>,
@@ -28,16 +30,18 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         belief: &Gaussian<N>,
         measurement: &Measurement<M>,
     ) -> Result<Self, FilterError> {
-        Comparison::of_reading(sensor, belief, &sensor.read(measurement))
+        Comparison::of_reading(sensor, belief, &sensor.read(measurement), measurement.age)
     }
 
-    /// Compares a reading that was taken before, when many beliefs are compared with one measurement.
+    /// Compares a reading of this age that was taken before, when many beliefs are compared with one measurement.
     #[inline(always)]
     pub fn of_reading(
         sensor: &impl Sensor<N, M>,
         belief: &Gaussian<N>,
         reading: &Reading<M>,
+        age: f64,
     ) -> Result<Self, FilterError> {
+        let sensor = Aged::new(sensor, age);
         let residual = sensor.difference(&reading.value, &sensor.expected(&belief.mean));
         if !residual.iter().all(|x| x.is_finite()) {
             return Err(FilterError::NotFinite { what: "innovation" });
@@ -47,7 +51,7 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         let factor = Cholesky::new(&(jacobian * cross + reading.noise), "innovation covariance")?;
         let nis = factor.mahalanobis(&residual);
         let innovation = Innovation::new(&residual, nis, factor.ln_density(nis));
-        Ok(Comparison { residual, noise: reading.noise, jacobian, cross, factor, innovation })
+        Ok(Comparison { age, residual, noise: reading.noise, jacobian, cross, factor, innovation })
     }
 
     /// Conditions the belief on the measurement, with the covariance in Joseph's form. On an error it stays as it was.
@@ -73,8 +77,9 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
     ) -> Result<SMatrix<f64, N, N>, FilterError> {
         // With A = (I - K H) P = P - K (P Hᵀ)ᵀ computed once.
         let shrunk = belief.covariance - gain * self.cross.transpose();
-        let mut covariance =
-            shrunk - (sensor.project(&shrunk, &self.jacobian) - gain * self.noise) * gain.transpose();
+        let mut covariance = shrunk
+            - (Aged::new(sensor, self.age).project(&shrunk, &self.jacobian) - gain * self.noise)
+                * gain.transpose();
         positive::symmetrise(&mut covariance);
         if !positive::is_definite(&covariance) {
             covariance = self.factored(belief, gain)?;
@@ -98,9 +103,23 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
     }
 }
 
-/// Compares a belief with several measurements. What the expected reading shares with them all is computed once, and the factor
-/// of the innovation covariance once for readings of the same noise.
+/// Compares a belief with several measurements. What the expected reading shares with those of one age is computed once, and the
+/// factor of the innovation covariance once for readings of the same noise.
 pub(crate) fn compare_all<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    belief: &Gaussian<N>,
+    measurements: &[&Measurement<M>],
+    found: &mut Vec<Result<Innovation, FilterError>>,
+) {
+    found.clear();
+    for run in measurements.chunk_by(|one, next| one.age == next.age) {
+        compare_run(&Aged::new(sensor, run[0].age), belief, run, found);
+    }
+}
+
+/// The same for measurements that the sensor took at one time.
+#[inline]
+fn compare_run<const N: usize, const M: usize>(
     sensor: &impl Sensor<N, M>,
     belief: &Gaussian<N>,
     measurements: &[&Measurement<M>],
@@ -110,7 +129,6 @@ pub(crate) fn compare_all<const N: usize, const M: usize>(
     let jacobian = sensor.jacobian(&belief.mean);
     let spread = jacobian * sensor.project(&belief.covariance, &jacobian);
     let mut last: Option<(SMatrix<f64, M, M>, Cholesky<M>, f64)> = None;
-    found.clear();
     found.extend(measurements.iter().map(|measurement| {
         let reading = sensor.read(measurement);
         let residual = sensor.difference(&reading.value, &expected);
@@ -129,7 +147,7 @@ pub(crate) fn compare_all<const N: usize, const M: usize>(
     }));
 }
 
-/// Conditions a belief on several measurements with one gain, which is exact if their noise is the same: the means differ by what
+/// Conditions a belief on several measurements with one gain, which is exact if their noise and age are the same: the means differ by what
 /// the gain makes of the residuals, and the covariance is common. Returns the weight of the measurements; none, and leaves the
 /// belief as it was, where that is not possible.
 pub(crate) fn associate<const N: usize, const M: usize>(
@@ -138,16 +156,18 @@ pub(crate) fn associate<const N: usize, const M: usize>(
     parts: &[(f64, &Measurement<M>)],
     none: f64,
 ) -> Option<f64> {
-    let common = sensor.read(parts.first()?.1);
-    let comparison = Comparison::of_reading(sensor, belief, &common).ok()?;
-    let expected = sensor.expected(&belief.mean);
+    let first = parts.first()?.1;
+    let common = sensor.read(first);
+    let comparison = Comparison::of_reading(sensor, belief, &common, first.age).ok()?;
+    let expected = Aged::new(sensor, first.age).expected(&belief.mean);
     // Mean and covariance of the residual; it is zero where no measurement is the object's own.
     let (mut mean, mut scatter) = (SVector::<f64, M>::zeros(), SMatrix::<f64, M, M>::zeros());
     let (mut total, mut weight) = (none, 0.0);
     for (part, measurement) in parts.iter().filter(|part| part.0 > 0.0) {
         let reading = sensor.read(measurement);
         let difference = sensor.difference(&reading.value, &expected) - mean;
-        if reading.noise != common.noise || !difference.iter().all(|x| x.is_finite()) {
+        let alike = reading.noise == common.noise && measurement.age == first.age;
+        if !alike || !difference.iter().all(|x| x.is_finite()) {
             return None;
         }
         (total, weight) = (total + part, weight + part);

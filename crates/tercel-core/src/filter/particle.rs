@@ -10,7 +10,7 @@ use super::{Filter, Innovation, sampling};
 use crate::belief::{Cholesky, Gaussian, positive};
 use crate::error::FilterError;
 use crate::motion::Sampled;
-use crate::sensor::{Measurement, Reading, Sensor};
+use crate::sensor::{Aged, Measurement, Reading, Sensor};
 
 /// Estimates the state of an object by many weighted guesses, for motion and sensors of any shape.
 ///
@@ -310,9 +310,10 @@ impl<T, S, const M: usize> Particle<T, S, M> {
     where
         S: Sensor<N, M>,
     {
-        let Reading { value, noise } = self.sensor.read(measurement);
+        let sensor = Aged::new(&self.sensor, measurement.age);
+        let Reading { value, noise } = sensor.read(measurement);
         let factor = Cholesky::new(&noise, "noise of the measurement")?;
-        let residual_of = |state| self.sensor.difference(&value, &self.sensor.expected(state));
+        let residual_of = |state| sensor.difference(&value, &sensor.expected(state));
         let (mut mean, mut square) = (SVector::<f64, M>::zeros(), SMatrix::<f64, M, M>::zeros());
         let (mut top, mut sum) = (f64::NEG_INFINITY, 0.0);
         let mut origin = None;

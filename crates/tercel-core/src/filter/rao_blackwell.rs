@@ -159,10 +159,12 @@ where
         let mut blend = Blend::default();
         let mut failure = None;
         belief.correct(|ln_weight, state| {
-            let corrected = Comparison::of_reading(&self.sensor, state, &reading).and_then(|comparison| {
-                comparison.condition(&self.sensor, state)?;
-                Ok(comparison.innovation)
-            });
+            let corrected = Comparison::of_reading(&self.sensor, state, &reading, measurement.age).and_then(
+                |comparison| {
+                    comparison.condition(&self.sensor, state)?;
+                    Ok(comparison.innovation)
+                },
+            );
             match corrected {
                 Ok(innovation) => blend.add_weighted(ln_weight.exp(), ln_weight, &innovation),
                 Err(error) => {
@@ -191,7 +193,7 @@ where
         let mut blend = Blend::default();
         let mut failure = None;
         for (hypothesis, &ln_weight) in belief.particles().iter().zip(belief.ln_weights()) {
-            match Comparison::of_reading(&self.sensor, &hypothesis.state, &reading) {
+            match Comparison::of_reading(&self.sensor, &hypothesis.state, &reading, measurement.age) {
                 Ok(comparison) => {
                     blend.add_weighted(ln_weight.exp(), ln_weight, &comparison.innovation);
                 }

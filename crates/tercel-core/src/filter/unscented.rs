@@ -8,7 +8,7 @@ use super::{Filter, Innovation, SigmaPoints};
 use crate::belief::{Cholesky, Gaussian};
 use crate::error::FilterError;
 use crate::motion::Motion;
-use crate::sensor::{Measurement, Reading, Sensor};
+use crate::sensor::{Aged, Measurement, Reading, Sensor};
 
 /// Estimates the state of an object whose motion or sensor bends, by sending a few points of the belief through both.
 ///
@@ -147,7 +147,7 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         points: &Points<N, N>,
         measurement: &Measurement<M>,
     ) -> Result<Self, FilterError> {
-        let sensor = &filter.sensor;
+        let sensor = Aged::new(&filter.sensor, measurement.age);
         let reading = sensor.read(measurement);
         let image = points
             .map(|state| sensor.expected(state))

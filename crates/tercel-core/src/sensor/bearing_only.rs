@@ -91,7 +91,7 @@ impl<const N: usize> Sensor<N, 1> for BearingOnly {
         let bearing = measurement.value[0];
         let polar = Matrix2::from_diagonal(&vector![deviation * deviation, noise]);
         let place = self.position + cartesian(range, bearing);
-        Ok(placed(prior, &place, &rotated(range, bearing, &polar)))
+        Ok(placed(prior, &place, &rotated(range, bearing, &polar)).moved_on(2, measurement.age))
     }
 
     fn place(&self, _: &Measurement<1>) -> Option<Vector2<f64>> {

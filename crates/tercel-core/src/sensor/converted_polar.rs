@@ -138,16 +138,8 @@ impl<const N: usize> Sensor<N, 2> for ConvertedPolar {
     fn birth(&self, measurement: &Measurement<2>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError> {
         finite(measurement)?;
         let reading = Sensor::<N, 2>::read(self, measurement);
-        let mut belief = placed(prior, &reading.value, &reading.noise);
-        let lag = self.lag_of::<N>();
-        if lag != 0.0 {
-            let mut shift = SMatrix::<f64, N, N>::identity();
-            for i in 0..2 {
-                shift[(i, i + 2)] = lag;
-            }
-            belief.mean = shift * belief.mean;
-            belief.covariance = shift * belief.covariance * shift.transpose();
-        }
+        let lag = self.lag_of::<N>() + measurement.age;
+        let mut belief = placed(prior, &reading.value, &reading.noise).moved_on(2, lag);
         belief.settle()?;
         Ok(belief)
     }

@@ -11,8 +11,10 @@
 //! Bearings are mathematical: zero along `x`, counter-clockwise. Every sensor stands somewhere and may be moved between
 //! scans: sensors are small values, so a moved one is simply a new one.
 
+mod aged;
 mod bearing_only;
 mod converted_polar;
+mod measurement;
 mod position;
 mod range_bearing;
 mod range_bearing_rate;
@@ -24,59 +26,18 @@ use nalgebra::{SMatrix, SVector, Vector2};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
+pub use aged::Aged;
 pub use bearing_only::BearingOnly;
 pub use converted_polar::ConvertedPolar;
+pub use measurement::{Measurement, Reading};
 pub use position::Position;
 pub use range_bearing::RangeBearing;
 pub use range_bearing_rate::RangeBearingRate;
 
-/// One measurement of `M` components, with its own noise covariance when the sensor reports one.
-///
-/// ```
-/// use tercel_core::sensor::Measurement;
-///
-/// let plot: Measurement<2> = [1200.0, 0.3].into();
-/// assert_eq!(plot.noise, None);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measurement<const M: usize> {
-    /// What was measured, in the sensor's components and order.
-    pub value: SVector<f64, M>,
-    /// Covariance of the error of `value`, when it comes with the measurement; otherwise the sensor's own holds.
-    pub noise: Option<SMatrix<f64, M, M>>,
-}
-
-impl<const M: usize> From<[f64; M]> for Measurement<M> {
-    fn from(value: [f64; M]) -> Self {
-        Measurement { value: value.into(), noise: None }
-    }
-}
-
-impl<const M: usize> From<SVector<f64, M>> for Measurement<M> {
-    fn from(value: SVector<f64, M>) -> Self {
-        Measurement { value, noise: None }
-    }
-}
-
-impl<const M: usize> Measurement<M> {
-    /// The same measurement with its own noise covariance.
-    pub fn with_noise(self, noise: SMatrix<f64, M, M>) -> Self {
-        Measurement { noise: Some(noise), ..self }
-    }
-}
-
-/// A measurement in the components in which a filter compares it with what was expected.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading<const M: usize> {
-    /// The measured components.
-    pub value: SVector<f64, M>,
-    /// Covariance of their errors.
-    pub noise: SMatrix<f64, M, M>,
-}
-
 /// A sensor that measures `M` components of a state of `N` components.
 ///
-/// The state begins with positions, as [`Gaussian`] says.
+/// The state begins with positions, as [`Gaussian`] says. `expected`, `jacobian` and `footprint` are those of a measurement
+/// that was taken at the time of the state; [`Aged`] makes those of an older one of them.
 pub trait Sensor<const N: usize, const M: usize> {
     /// What the sensor would read of an object in this state, without noise.
     fn expected(&self, state: &SVector<f64, N>) -> SVector<f64, M>;
@@ -123,13 +84,14 @@ pub trait Sensor<const N: usize, const M: usize> {
     }
 
     /// What is believed of a new object that caused this measurement, given what was believed of any new object:
-    /// its position comes from the measurement, the rest from `prior`.
+    /// its position comes from the measurement, the rest from `prior`. It holds at the time of the scan: the position of an
+    /// aged measurement is [moved on](Gaussian::moved_on) by the velocity, with the covariance that goes with it.
     ///
     /// # Errors
     /// [`FilterError::NotInvertible`] when the measurement does not say where the object is.
     fn birth(&self, measurement: &Measurement<M>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError>;
 
-    /// Where in the plane (`x, y`) the measurement was taken to be, if it says so.
+    /// Where in the plane (`x, y`) the object was when it was measured, if the measurement says so.
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>>;
 
     /// Where in the plane a measurement of an object in this state is expected, and the covariance of the error of its
@@ -137,6 +99,12 @@ pub trait Sensor<const N: usize, const M: usize> {
     ///
     /// `None` for sensors that do not say where an object is.
     fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)>;
+
+    /// Number of positions at the beginning of the state, which as many velocities follow: what an
+    /// [age](Measurement::age) is applied to. The default is 2, the plane.
+    fn axes(&self) -> usize {
+        2
+    }
 
     /// Area of the plane (m²) that one unit of volume of the reading's space covers near a measurement, so that a
     /// clutter intensity given per m² becomes one per unit of the reading.
@@ -180,6 +148,9 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
     }
     fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
         (**self).footprint(state)
+    }
+    fn axes(&self) -> usize {
+        (**self).axes()
     }
     fn area(&self, measurement: &Measurement<M>) -> f64 {
         (**self).area(measurement)
@@ -229,7 +200,7 @@ fn placed<const N: usize>(
 /// Fails on a measurement that holds a number that is not finite.
 fn finite<const M: usize>(measurement: &Measurement<M>) -> Result<(), FilterError> {
     let noise_is_finite = measurement.noise.is_none_or(|noise| noise.iter().all(|x| x.is_finite()));
-    if noise_is_finite && measurement.value.iter().all(|x| x.is_finite()) {
+    if noise_is_finite && measurement.age.is_finite() && measurement.value.iter().all(|x| x.is_finite()) {
         return Ok(());
     }
     Err(FilterError::NotFinite { what: "measurement" })

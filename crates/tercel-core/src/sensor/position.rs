@@ -96,7 +96,7 @@ impl<const N: usize, const M: usize> Sensor<N, M> for Position<M> {
         finite(measurement)?;
         let reading = Sensor::<N, M>::read(self, measurement);
         // p = z + τ v + noise: the position inherits the prior of the velocity through the lag.
-        let lag = self.lag_of::<N>();
+        let lag = if N >= 2 * M { self.lag + measurement.age } else { 0.0 };
         let mut spread = SMatrix::<f64, N, N>::identity();
         for i in 0..M {
             spread[(i, i)] = 0.0;
@@ -116,6 +116,10 @@ impl<const N: usize, const M: usize> Sensor<N, M> for Position<M> {
         }
         belief.settle()?;
         Ok(belief)
+    }
+
+    fn axes(&self) -> usize {
+        M
     }
 
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {

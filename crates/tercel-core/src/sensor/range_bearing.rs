@@ -92,7 +92,7 @@ impl<const N: usize> Sensor<N, 2> for RangeBearing {
         let noise = Sensor::<N, 2>::read(self, measurement).noise;
         let (range, bearing) = (measurement.value[0], measurement.value[1]);
         let place = self.position + cartesian(range, bearing);
-        Ok(placed(prior, &place, &rotated(range, bearing, &noise)))
+        Ok(placed(prior, &place, &rotated(range, bearing, &noise)).moved_on(2, measurement.age))
     }
 
     fn place(&self, measurement: &Measurement<2>) -> Option<Vector2<f64>> {

@@ -71,10 +71,12 @@ impl RangeBearingRate {
         (offset(state, &self.polar.position()), velocity)
     }
 
+    /// Range and bearing alone, as of the moment at which they were measured.
     fn polar_part(measurement: &Measurement<3>) -> Measurement<2> {
         Measurement {
             value: vector![measurement.value[0], measurement.value[1]],
             noise: measurement.noise.map(|noise| noise.fixed_view::<2, 2>(0, 0).into_owned()),
+            age: 0.0,
         }
     }
 }
@@ -125,6 +127,7 @@ impl<const N: usize> Sensor<N, 3> for RangeBearingRate {
         let gain = Cholesky::new(&innovation, "range rate innovation")?.right_solve(&cross);
         belief.mean += gain * (measurement.value[2] - expected);
         belief.covariance -= gain * cross.transpose();
+        let mut belief = belief.moved_on(2, measurement.age);
         belief.settle()?;
         Ok(belief)
     }

@@ -32,6 +32,59 @@ fn jacobians_are_the_derivatives_of_the_expected_readings() {
 }
 
 #[test]
+fn jacobians_of_aged_sensors_are_the_derivatives_of_their_expected_readings() {
+    for state in [vector![300.0, 400.0, 12.0, -5.0], vector![-500.0, 0.0, 3.0, 9.0]] {
+        let here = vector![20.0, 0.0];
+        let position = Position::<2>::new(1.0).unwrap().with_lag(2.0);
+        assert!(jacobian_error(&Aged::new(&position, 1.5), state) < 1e-8);
+        assert_eq!(
+            Aged::new(&position, 1.5).expected(&state),
+            Sensor::<4, 2>::expected(&position.with_lag(3.5), &state)
+        );
+        let converted = ConvertedPolar::new(1.0, 0.1).unwrap().at(here).with_lag(1.0);
+        assert!(jacobian_error(&Aged::new(&converted, 2.0), state) < 1e-8);
+        let polar = RangeBearing::new(1.0, 0.1).unwrap().at(here);
+        assert!(jacobian_error(&Aged::new(&polar, 3.0), state) < 1e-8);
+        assert!(jacobian_error(&Aged::new(&BearingOnly::new(0.1).unwrap().at(here), 3.0), state) < 1e-8);
+        let doppler = RangeBearingRate::new(1.0, 0.1, 0.5).unwrap().at(here, vector![5.0, 1.0]);
+        assert!(jacobian_error(&Aged::new(&doppler, 4.0), state) < 1e-8);
+        let space = vector![1.0, 2.0, 3.0, 40.0, 50.0, 60.0];
+        let aged = Aged::new(&position, 2.0);
+        assert!((Sensor::<4, 2>::jacobian(&aged, &state) * state - aged.expected(&state)).norm() < 1e-9);
+        let position = Position::<3>::new(1.0).unwrap();
+        assert!(jacobian_error(&Aged::new(&position, 0.5), space) < 1e-8);
+        assert_eq!(Aged::new(&position, 0.5).expected(&space), vector![-19.0, -23.0, -27.0]);
+        // Without velocities there is nothing to move.
+        assert_eq!(Sensor::<2, 2>::expected(&Aged::new(&polar, 9.0), &vector![20.0, 7.0])[0], 7.0);
+    }
+}
+
+#[test]
+fn a_birth_from_an_aged_measurement_is_a_birth_then_and_a_prediction_since() {
+    let prior: Gaussian<4> = ConstantVelocity::new(0.0).with_speed(20.0).prior();
+    fn agrees<const M: usize>(
+        sensor: &impl Sensor<4, M>,
+        seen: [f64; M],
+        prior: &Gaussian<4>,
+    ) -> Result<(), FilterError> {
+        let fresh = sensor.birth(&seen.into(), prior)?;
+        let expected = ConstantVelocity::new(0.0).predict(&fresh, 2.5);
+        let aged = sensor.birth(&Measurement::from(seen).with_age(2.5), prior)?;
+        assert!((aged.mean - expected.mean).amax() < 1e-9 * expected.mean.amax());
+        assert!((aged.covariance - expected.covariance).amax() < 1e-9 * expected.covariance.amax());
+        assert!(aged.covariance[(0, 2)] > fresh.covariance[(0, 2)] + 300.0);
+        let broken = sensor.birth(&Measurement::from(seen).with_age(f64::NAN), prior);
+        assert_eq!(broken, Err(FilterError::NotFinite { what: "measurement" }));
+        Ok(())
+    }
+    agrees(&Position::<2>::new(5.0).unwrap().with_lag(1.0), [40.0, 30.0], &prior).unwrap();
+    agrees(&ConvertedPolar::new(5.0, 0.01).unwrap().with_lag(1.0), [400.0, 0.3], &prior).unwrap();
+    agrees(&RangeBearing::new(5.0, 0.01).unwrap(), [400.0, 0.3], &prior).unwrap();
+    agrees(&BearingOnly::new(0.01).unwrap().with_range(300.0, 50.0).unwrap(), [1.2], &prior).unwrap();
+    agrees(&RangeBearingRate::new(5.0, 0.01, 50.0).unwrap(), [400.0, 0.3, 3.0], &prior).unwrap();
+}
+
+#[test]
 fn bearings_differ_by_less_than_half_a_turn() {
     let radar = RangeBearing::new(1.0, 0.1).unwrap();
     let difference = Sensor::<4, 2>::difference(&radar, &vector![0.0, 3.1], &vector![0.0, -3.1]);

@@ -14,9 +14,10 @@ use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Estimate, Extended, Filter, Innovation};
 use tercel_core::motion::{Motion, Turn};
-use tercel_core::sensor::{LinearSensor, Measurement};
+use tercel_core::sensor::{Aged, LinearSensor, Measurement, Sensor};
 
 use super::kalman_net::{KalmanNet, LABELS};
+use super::present;
 use crate::error::ModelError;
 use belief::Mode;
 use features::{Scene, Sight};
@@ -174,12 +175,13 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
 
     /// Lets a copy of each KalmanNet take the measurement.
     fn follow(&self, belief: &mut EnsKNetsBelief, measurement: &Measurement<2>) -> Result<(), FilterError> {
-        let noise = self.sensor.read(measurement).noise;
+        let sensor = Aged::new(&self.sensor, measurement.age);
+        let noise = sensor.read(measurement).noise;
         for ((next, mode), net) in belief.next.iter_mut().zip(&belief.modes).zip(&self.nets) {
             next.copy(mode);
             let before = net.state(&next.net);
             let innovation = net.update(&mut next.net, measurement)?;
-            let jacobian = self.sensor.jacobian(&before.mean);
+            let jacobian = sensor.jacobian(&before.mean);
             next.evidence = Evidence {
                 state: net.state(&next.net).mean,
                 residual: Vector2::new(innovation.residual()[0], innovation.residual()[1]),
@@ -200,13 +202,12 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
             attended += mode.evidence.state * mode.weight;
             total += mode.weight;
         }
-        let reading = self.sensor.read(measurement);
         let scene = Scene {
             modes,
             mean,
             attended: attended / total,
-            reading: reading.value,
-            noise: reading.noise,
+            reading: present(&self.sensor, measurement, &mean),
+            noise: self.sensor.read(measurement).noise,
             origin: self.origin,
             anchor: *anchor,
             waited: *waited,

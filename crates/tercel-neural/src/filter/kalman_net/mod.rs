@@ -13,9 +13,10 @@ use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Extended, Filter, Innovation};
 use tercel_core::motion::Motion;
-use tercel_core::sensor::{LinearSensor, Measurement};
+use tercel_core::sensor::{Aged, LinearSensor, Measurement, Sensor};
 
 use super::memory::{Memory, Room};
+use super::present;
 use features::{History, View};
 
 pub use hyper::{Architecture, Covariance, Feature, KalmanNetHyper};
@@ -168,8 +169,9 @@ impl<T: Motion<4>, S: LinearSensor<4, 2>> KalmanNet<T, S> {
         gain: &Matrix4x2<f64>,
         measurement: &Measurement<2>,
     ) -> Matrix4<f64> {
-        let rest = Matrix4::identity() - gain * self.sensor.jacobian(&state.mean);
-        let noise = self.sensor.read(measurement).noise;
+        let sensor = Aged::new(&self.sensor, measurement.age);
+        let rest = Matrix4::identity() - gain * sensor.jacobian(&state.mean);
+        let noise = sensor.read(measurement).noise;
         rest * state.covariance * rest.transpose() + gain * noise * gain.transpose()
     }
 }
@@ -180,7 +182,7 @@ impl<T: Motion<4>, S: LinearSensor<4, 2>> Filter<4> for KalmanNet<T, S> {
 
     fn birth(&self, measurement: &Measurement<2>) -> Result<KalmanNetBelief, FilterError> {
         let state = self.sensor.birth(measurement, &self.motion.prior())?;
-        let history = History::new(self.sensor.read(measurement).value);
+        let history = History::new(present(&self.sensor, measurement, &state.mean));
         let scratch = self.network.hyper().inputs() + self.network.scratch(1);
         Ok(KalmanNetBelief { state, history, memory: Memory::new(&self.network.initial(), scratch) })
     }
@@ -202,7 +204,7 @@ impl<T: Motion<4>, S: LinearSensor<4, 2>> Filter<4> for KalmanNet<T, S> {
         let mut next = belief.state;
         // Also refuses what is not finite before the network sees it.
         let innovation = self.classical().update(&mut next, measurement)?;
-        let reading = self.sensor.read(measurement).value;
+        let reading = present(&self.sensor, measurement, &belief.state.mean);
         let difference = self.sensor.difference(&reading, &self.sensor.expected(&belief.state.mean));
         let gain = self.gain(belief, &reading, &difference);
         let correction = gain * difference;

@@ -214,7 +214,7 @@ impl<S: Sensor<4, M>, const M: usize> NeuralImm<S, M> {
         belief.outlook.look(&self.bank, &belief.bank, modes, state, origin);
     }
 
-    /// Where a measurement puts the object, the covariance of its error, and how unsure the bank is of the latter: the standard
+    /// Where a measurement puts the object at the time when it was taken, the covariance of its error, and how unsure the bank is of the latter: the standard
     /// deviation of the logarithm of its trace.
     fn placed(
         &self,
@@ -225,9 +225,10 @@ impl<S: Sensor<4, M>, const M: usize> NeuralImm<S, M> {
         let each = self.bank.rates().len() * self.bank.noises().len();
         let (mut place, mut noise) = (Vector2::zeros(), Matrix2::zeros());
         let (mut first, mut second) = (0.0, 0.0);
+        let fresh = measurement.with_age(0.0);
         for (modes, filters) in modes.chunks(each).zip(self.filter.filters().chunks(each)) {
             let weight: f64 = modes.iter().sum();
-            let born = filters[0].birth(measurement)?;
+            let born = filters[0].birth(&fresh)?;
             let own: Matrix2<f64> = born.covariance.fixed_view::<2, 2>(0, 0).into_owned();
             let size = own.trace().max(f64::MIN_POSITIVE).ln();
             place += born.mean.fixed_rows::<2>(0) * weight;
@@ -247,7 +248,8 @@ impl<S: Sensor<4, M>, const M: usize> NeuralImm<S, M> {
     ) -> Result<(), FilterError> {
         let (place, noise, unsure) = self.placed(&belief.bank, measurement)?;
         let NeuralImmBelief { outlook, before, inputs, waited, .. } = belief;
-        let off = place - before.state().mean.fixed_rows::<2>(0);
+        let seen = before.state().moved_on(2, -measurement.age).mean;
+        let off = place - seen.fixed_rows::<2>(0);
         let off = before.turned(&Vector4::new(off.x, off.y, 0.0, 0.0));
         let turn = outlook.turn();
         let sight = turn.fixed_view::<2, 2>(0, 0);

@@ -219,6 +219,14 @@ fn asked(
     outputs.iter().all(|value| value.is_finite()).then_some(frame)
 }
 
+impl<S: Sensor<4, 2>> TrMtt<S> {
+    /// Where an object in this state that gave this measurement is now: the window holds places at the times of the scans.
+    fn present_place(&self, measurement: &Measurement<2>, state: &Gaussian<4>) -> Option<Vector2<f64>> {
+        let velocity = state.mean.fixed_rows::<2>(2).into_owned();
+        Some(self.place(measurement)? + velocity * measurement.age)
+    }
+}
+
 impl<S: Sensor<4, 2>> Filter<4> for TrMtt<S> {
     type Belief = TrMttBelief;
     type Measurement = Measurement<2>;
@@ -227,7 +235,7 @@ impl<S: Sensor<4, 2>> Filter<4> for TrMtt<S> {
         let carrier = self.carrier.birth(measurement)?;
         let Working { mut window, inputs, mask, outputs, scratch } = Working::new(&self.network);
         if let Some(last) = window.last_mut() {
-            *last = self.place(measurement);
+            *last = self.present_place(measurement, &carrier);
         }
         let scratch = Memory::new(&[], scratch.len());
         Ok(TrMttBelief { carrier, window, estimate: None, scales: [0.0; 2], inputs, mask, outputs, scratch })
@@ -254,7 +262,8 @@ impl<S: Sensor<4, 2>> Filter<4> for TrMtt<S> {
         measurement: &Measurement<2>,
     ) -> Result<Innovation, FilterError> {
         let innovation = self.carrier.update(&mut belief.carrier, measurement)?;
-        let Some(place) = self.place(measurement) else { return Ok(innovation) };
+        let place = self.present_place(measurement, &belief.carrier);
+        let Some(place) = place else { return Ok(innovation) };
         if let Some(last) = belief.window.last_mut() {
             *last = Some(last.map_or(place, |before| (before + place) / 2.0));
         }
