@@ -1,8 +1,11 @@
 //! How likely a sensor sees an object.
 
-use nalgebra::Vector2;
+use std::f64::consts::TAU;
+
+use nalgebra::{SMatrix, Vector2};
 
 use crate::error::FilterError;
+use crate::sensor::wrapped;
 
 /// Probability that a scan holds a measurement of an object that is there, and what it means when it holds none.
 ///
@@ -25,6 +28,16 @@ pub struct Detection {
     table: Vec<(f64, f64)>,
     position: Vector2<f64>,
     reports: bool,
+    sector: Option<Sector>,
+}
+
+/// The bearings that a scan looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sector {
+    /// Where it begins, counter-clockwise, rad.
+    from: f64,
+    /// rad.
+    width: f64,
 }
 
 impl Detection {
@@ -38,7 +51,7 @@ impl Detection {
 
     /// Of reports: every measurement speaks of one object, and none is missed.
     pub fn reports() -> Self {
-        Detection { table: vec![(0.0, 1.0)], position: Vector2::zeros(), reports: true }
+        Detection { table: vec![(0.0, 1.0)], position: Vector2::zeros(), reports: true, sector: None }
     }
 
     /// True for reports.
@@ -75,7 +88,7 @@ impl Detection {
                 value: pair[1].0,
                 expected: "must be above the range before it",
             }),
-            None => Ok(Detection { table, position: Vector2::zeros(), reports: false }),
+            None => Ok(Detection { table, position: Vector2::zeros(), reports: false, sector: None }),
         }
     }
 
@@ -85,8 +98,25 @@ impl Detection {
         self
     }
 
+    /// Looks only at the bearings from `from` counter-clockwise over `width` (rad): what lies elsewhere is neither seen nor
+    /// missed. A width of a whole turn or more looks everywhere.
+    pub fn looking(mut self, from: f64, width: f64) -> Self {
+        self.sector = (width < TAU).then_some(Sector { from, width });
+        self
+    }
+
     /// Probability of detecting an object at `place`. Where the place is not known the probability at range zero is taken.
     pub fn probability(&self, place: Option<&Vector2<f64>>) -> f64 {
+        if let (Some(sector), Some(place)) = (self.sector, place)
+            && sector.depth(&(place - self.position)) < 0.0
+        {
+            return 0.0;
+        }
+        self.in_view(place)
+    }
+
+    /// The same where bearings do not matter.
+    fn in_view(&self, place: Option<&Vector2<f64>>) -> f64 {
         let (first, last) = (self.table[0], self.table[self.table.len() - 1]);
         if self.table.len() == 1 {
             return first.1;
@@ -102,12 +132,34 @@ impl Detection {
         }
     }
 
-    /// How an object at `place` is seen; see [`probability`](Detection::probability).
-    pub(super) fn sight(&self, place: Option<&Vector2<f64>>) -> Sight {
-        let seen = self.probability(place);
-        Sight { seen, missed: if self.reports { 0.0 } else { seen } }
+    /// How an object at `place`, known with the covariance `spread`, is seen; see [`probability`](Detection::probability). One
+    /// that may lie on either side of the edge of a sector may be seen, and is not missed.
+    pub(super) fn sight(&self, place: Option<&Vector2<f64>>, spread: Option<&SMatrix<f64, 2, 2>>) -> Sight {
+        let seen = self.in_view(place);
+        let missed = if self.reports { 0.0 } else { seen };
+        let (Some(sector), Some(place)) = (self.sector, place) else { return Sight { seen, missed } };
+        let offset = place - self.position;
+        let across = Vector2::new(-offset.y, offset.x) / offset.norm_squared().max(f64::MIN_POSITIVE);
+        let margin =
+            EDGE * spread.map_or(0.0, |spread| (across.transpose() * spread * across)[0].max(0.0).sqrt());
+        match sector.depth(&offset) {
+            depth if depth > margin => Sight { seen, missed },
+            depth if depth < -margin => Sight::default(),
+            _ => Sight { seen, missed: 0.0 },
+        }
     }
 }
+
+impl Sector {
+    /// How far inside the sector a bearing lies, rad; negative outside.
+    fn depth(&self, offset: &Vector2<f64>) -> f64 {
+        let middle = self.from + 0.5 * self.width;
+        0.5 * self.width - wrapped(offset.y.atan2(offset.x) - middle).abs()
+    }
+}
+
+/// Standard deviations within which an object may lie beyond the edge of a sector.
+const EDGE: f64 = 3.0;
 
 /// How likely an object is seen, and how much it says when it is not.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -120,7 +172,24 @@ pub(super) struct Sight {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
+    use nalgebra::vector;
+
+    #[test]
+    fn what_lies_outside_the_sector_is_neither_seen_nor_missed() {
+        // From 45 degrees before the negative x axis to 45 degrees behind it.
+        let radar = Detection::uniform(0.9).unwrap().looking(0.75 * PI, 0.5 * PI);
+        let spread = SMatrix::identity() * 25.0;
+        let sight = |x, y| radar.sight(Some(&vector![x, y]), Some(&spread));
+        assert_eq!(sight(-1000.0, 10.0), Sight { seen: 0.9, missed: 0.9 });
+        assert_eq!(sight(-1000.0, -10.0), Sight { seen: 0.9, missed: 0.9 });
+        assert_eq!(sight(1000.0, 0.0), Sight { seen: 0.0, missed: 0.0 });
+        // 7 m beyond the edge, of which the object is known to 5 m.
+        assert_eq!(sight(-1000.0, 1010.0), Sight { seen: 0.9, missed: 0.0 });
+        assert_eq!(radar.probability(Some(&vector![-1000.0, 1010.0])), 0.0);
+    }
 
     #[test]
     fn a_bad_table_is_refused() {

@@ -33,7 +33,8 @@ impl Vicinity {
         F: Filter<N> + ?Sized,
     {
         let reach = filter.reach(belief);
-        let sight = scan.detection.sight(reach.as_ref().map(|(centre, _)| centre));
+        let (centre, spread) = (reach.as_ref().map(|reach| &reach.0), reach.as_ref().map(|reach| &reach.1));
+        let sight = scan.detection.sight(centre, spread);
         match reach {
             _ if sight.seen == 0.0 => self.near.clear(),
             Some((centre, spread)) => {

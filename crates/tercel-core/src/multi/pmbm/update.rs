@@ -84,7 +84,7 @@ impl<B: Clone> Pmbm<B> {
         let mut all = Vec::with_capacity(scan.measurements.len());
         let mut ln_intensities = Vec::with_capacity(scan.measurements.len());
         for (number, (measurement, place)) in scan.measurements.iter().zip(places).enumerate() {
-            let sight = scan.detection.sight(place.as_ref());
+            let sight = scan.detection.sight(place.as_ref(), None);
             let objects = sight.seen * self.undetected.intensity(place.as_ref()) * filter.area(measurement);
             let ln_clutter = ln_clutter_at(filter, scan, measurement);
             let ln_intensity =

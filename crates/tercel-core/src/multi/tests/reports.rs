@@ -39,8 +39,7 @@ macro_rules! every_tracker_of_reports {
                 for turn in 0..10 {
                     for (ship, object) in HARBOUR.iter().enumerate() {
                         let time = f64::from(turn) * 60.0 + 7.0 * ship as f64;
-                        let [dx, dy]: [f64; 2] =
-                            std::array::from_fn(|_| StandardNormal.sample(&mut random));
+                        let [dx, dy]: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
                         let [x, y] = truth(&[*object], time)[0];
                         let report = report([x + 3.0 * dx, y + 3.0 * dy], ship as u32);
                         tracker.step(&filter, &scan(time, &report, &scene)).unwrap();
