@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 use tercel_core::error::FilterError;
-use tercel_core::filter::{Filter, Transition};
+use tercel_core::filter::{Filter, Identified, Named, NamedBelief, Transition};
 use tercel_core::motion::{
     ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Motion, RandomWalk, Singer, Turn,
 };
@@ -14,12 +14,14 @@ use crate::PipelineError;
 use crate::config::{self, Config, Estimator, MotionConfig, TrackerConfig};
 use crate::estimator::{Cloud, Mode, Recursion, Rule, Single, Switching};
 use crate::learned::Learned;
+use crate::names::Names;
 use crate::numbered::Numbered;
 use crate::sensors::{self, Kind, Station};
+use crate::turns::Look;
 
 /// What a scan led to.
 pub(crate) struct Outcome {
-    /// The tracks after the scan.
+    /// The tracks that the scan concerned: all of them, but for reports.
     pub rows: Vec<table::Track>,
     /// Where each detection lies in the plane, if it says so, and what became of it.
     pub uses: Vec<(Option<Vector2<f64>>, Use)>,
@@ -27,8 +29,8 @@ pub(crate) struct Outcome {
 
 /// A tracker with its filter.
 pub(crate) trait Engine {
-    /// Takes in one scan of one sensor.
-    fn step(&mut self, station: &Station, scan: &Scan) -> Result<Outcome, PipelineError>;
+    /// Takes in one scan of one sensor. Objects and detections have names.
+    fn step(&mut self, station: &Station, look: &Look, names: &mut Names) -> Result<Outcome, PipelineError>;
 
     /// Names of the modes of a track; empty where there is one motion.
     fn modes(&self) -> Vec<String>;
@@ -91,23 +93,25 @@ where
     let key = |error| PipelineError::parameter("tracker", &error);
     Ok(match &config.tracker {
         TrackerConfig::NearestNeighbour(settings) => {
-            let tracker = settings.build().and_then(NearestNeighbour::<R::Belief>::new).map_err(key)?;
+            let tracker =
+                settings.build().and_then(NearestNeighbour::<NamedBelief<R::Belief>>::new).map_err(key)?;
             Box::new(Runner { recursion, tracker })
         }
         TrackerConfig::Phd(settings) => {
-            let tracker = settings.build().and_then(Phd::<R::Belief>::new).map_err(key)?;
+            let tracker = settings.build().and_then(Phd::<NamedBelief<R::Belief>>::new).map_err(key)?;
             Box::new(Runner { recursion, tracker })
         }
         TrackerConfig::MultiBernoulli(settings) => {
-            let tracker = settings.build().and_then(MultiBernoulli::<R::Belief>::new).map_err(key)?;
+            let tracker =
+                settings.build().and_then(MultiBernoulli::<NamedBelief<R::Belief>>::new).map_err(key)?;
             Box::new(Runner { recursion, tracker })
         }
         TrackerConfig::Jpda(settings) => {
-            let tracker = settings.build().and_then(Jpda::<R::Belief>::new).map_err(key)?;
+            let tracker = settings.build().and_then(Jpda::<NamedBelief<R::Belief>>::new).map_err(key)?;
             Box::new(Runner { recursion, tracker })
         }
         TrackerConfig::Pmbm(settings) => {
-            let tracker = settings.build().and_then(Pmbm::<R::Belief>::new).map_err(key)?;
+            let tracker = settings.build().and_then(Pmbm::<NamedBelief<R::Belief>>::new).map_err(key)?;
             Box::new(Runner { recursion, tracker })
         }
     })
@@ -121,59 +125,79 @@ struct Runner<R, T, const N: usize> {
 impl<R, T, const N: usize> Runner<R, T, N>
 where
     R: Recursion<N>,
-    T: Tracker<Belief = R::Belief>,
+    T: Tracker<Belief = NamedBelief<R::Belief>>,
 {
     fn run<const M: usize>(
         &mut self,
         sensor: &dyn Sensor<N, M>,
-        station: &Station,
-        scan: &Scan,
         measurements: &[Measurement<M>],
+        (station, look, names): (&Station, &Look, &mut Names),
     ) -> Result<Outcome, PipelineError> {
         let tracker = &mut self.tracker;
+        let named = |(number, detection): (usize, &table::Detection)| {
+            let identity = detection.identity.as_ref().map(|name| names.number(name));
+            Named { measurement: number, identity }
+        };
+        let numbers: Vec<Named<usize>> = look.scan.detections.iter().enumerate().map(named).collect();
+        let unusable = |error| PipelineError::parameter("motion", &error);
         self.recursion
             .with(sensor, |filter| {
-                let numbers: Vec<usize> = (0..measurements.len()).collect();
-                follow(tracker, &Numbered { filter, measurements }, station, scan, &numbers)
+                let filter = Identified::new(Numbered { filter, measurements }, station.reliability)
+                    .map_err(unusable)?;
+                follow(tracker, &filter, (station, look, names), &numbers)
             })
-            .map_err(|error| PipelineError::parameter("motion", &error))?
+            .map_err(unusable)?
     }
 }
 
-/// Takes in one scan, whose measurements the filter knows by their numbers.
-fn follow<T: Tracker, const N: usize>(
+/// A filter whose measurements are those of one scan, by number and name.
+type Followed<'a, B, const N: usize> =
+    dyn Filter<N, Belief = NamedBelief<B>, Measurement = Named<usize>> + 'a;
+
+/// Takes in one scan.
+fn follow<T, B, const N: usize>(
     tracker: &mut T,
-    filter: &dyn Filter<N, Belief = T::Belief, Measurement = usize>,
-    station: &Station,
-    scan: &Scan,
-    numbers: &[usize],
-) -> Result<Outcome, PipelineError> {
-    let detection = station.detection();
+    filter: &Followed<'_, B, N>,
+    (station, look, names): (&Station, &Look, &Names),
+    numbers: &[Named<usize>],
+) -> Result<Outcome, PipelineError>
+where
+    B: Clone,
+    T: Tracker<Belief = NamedBelief<B>>,
+{
+    let scan = &look.scan;
     let seen = multi::Scan {
         time: scan.time,
         measurements: numbers,
-        detection: &detection,
+        detection: &station.looking(look.sector),
         clutter: &station.clutter,
     };
     let refused = |source| PipelineError::Tracker { sensor: scan.sensor.to_string(), source };
     tracker.step(filter, &seen).map_err(refused)?;
     let places = numbers.iter().map(|number| filter.place(number));
     let uses = places.zip(tracker.uses().iter().copied()).collect();
-    Ok(Outcome { rows: rows(filter, tracker.tracks(), scan)?, uses })
+    let row = |track: &multi::Track<NamedBelief<B>>| row(filter, track, scan, names);
+    let rows = match tracker.active() {
+        Some(active) => active.iter().map(|&at| row(&tracker.tracks()[at])).collect::<Result<_, _>>()?,
+        None => tracker.tracks().iter().map(row).collect::<Result<_, _>>()?,
+    };
+    Ok(Outcome { rows, uses })
 }
 
 impl<R, T, const N: usize> Engine for Runner<R, T, N>
 where
     R: Recursion<N>,
-    T: Tracker<Belief = R::Belief>,
+    T: Tracker<Belief = NamedBelief<R::Belief>>,
 {
-    fn step(&mut self, station: &Station, scan: &Scan) -> Result<Outcome, PipelineError> {
+    fn step(&mut self, station: &Station, look: &Look, names: &mut Names) -> Result<Outcome, PipelineError> {
+        let scan = &look.scan;
+        let with = (station, look, names);
         match &station.kind {
-            Kind::Position(sensor) => self.run(sensor, station, scan, &sensors::positions(scan)?),
-            Kind::Converted(sensor) => self.run(sensor, station, scan, &sensors::ranges(scan)?),
-            Kind::RangeBearing(sensor) => self.run(sensor, station, scan, &sensors::ranges(scan)?),
-            Kind::RangeBearingRate(sensor) => self.run(sensor, station, scan, &sensors::range_rates(scan)?),
-            Kind::Bearing(sensor) => self.run(sensor, station, scan, &sensors::bearings(scan)?),
+            Kind::Position(sensor) => self.run(sensor, &sensors::positions(scan)?, with),
+            Kind::Converted(sensor) => self.run(sensor, &sensors::ranges(scan)?, with),
+            Kind::RangeBearing(sensor) => self.run(sensor, &sensors::ranges(scan)?, with),
+            Kind::RangeBearingRate(sensor) => self.run(sensor, &sensors::range_rates(scan)?, with),
+            Kind::Bearing(sensor) => self.run(sensor, &sensors::bearings(scan)?, with),
         }
     }
 
@@ -182,33 +206,31 @@ where
     }
 }
 
-/// The tracks of a tracker as rows of the table.
-fn rows<const N: usize, B: Clone>(
-    filter: &dyn Filter<N, Belief = B, Measurement = usize>,
-    tracks: &[multi::Track<B>],
+/// A track as a row of the table.
+fn row<B: Clone, const N: usize>(
+    filter: &Followed<'_, B, N>,
+    track: &multi::Track<NamedBelief<B>>,
     scan: &Scan,
-) -> Result<Vec<table::Track>, PipelineError> {
-    let row = |track: &multi::Track<B>| {
-        let estimate = filter.estimate(&track.belief);
-        if !estimate.mean.iter().chain(&estimate.covariance).all(|number| number.is_finite()) {
-            return Err(PipelineError::Estimate { time: scan.time, track: track.id });
-        }
-        let upper = (0..N).flat_map(|i| (i..N).map(move |j| (i, j)));
-        Ok(table::Track {
-            time: scan.time,
-            sensor: scan.sensor.clone(),
-            track: track.id,
-            status: track.status,
-            existence: track.existence,
-            state: estimate.mean.iter().copied().collect(),
-            covariance: upper.map(|index| estimate.covariance[index]).collect(),
-            modes: estimate.modes,
-            extent: None,
-            identity: None,
-            detection: track.measurement.map(|number| scan.detections[number].id),
-        })
-    };
-    tracks.iter().map(row).collect()
+    names: &Names,
+) -> Result<table::Track, PipelineError> {
+    let estimate = filter.estimate(&track.belief);
+    if !estimate.mean.iter().chain(&estimate.covariance).all(|number| number.is_finite()) {
+        return Err(PipelineError::Estimate { time: scan.time, track: track.id });
+    }
+    let upper = (0..N).flat_map(|i| (i..N).map(move |j| (i, j)));
+    Ok(table::Track {
+        time: scan.time,
+        sensor: scan.sensor.clone(),
+        track: track.id,
+        status: track.status,
+        existence: track.existence,
+        state: estimate.mean.iter().copied().collect(),
+        covariance: upper.map(|index| estimate.covariance[index]).collect(),
+        modes: estimate.modes,
+        extent: None,
+        identity: filter.called(&track.belief).and_then(|identity| names.name(identity)).cloned(),
+        detection: track.measurement.map(|number| scan.detections[number].id),
+    })
 }
 
 fn modes<const N: usize>(

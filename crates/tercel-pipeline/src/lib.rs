@@ -26,18 +26,25 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod antenna;
+mod carrier;
 pub mod config;
 mod engine;
 mod error;
 mod estimator;
 mod learned;
+mod names;
+mod notice;
 mod numbered;
 mod pipeline;
 mod reorder;
 mod sensors;
+mod turns;
+mod understood;
 
 pub use config::Config;
 pub use error::PipelineError;
+pub use notice::Notice;
 pub use pipeline::{Pipeline, Summary};
 
 #[cfg(test)]

@@ -1,28 +1,37 @@
 //! Scans in, tracks out.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
 
 use tercel_core::multi::{Clutter, Status, Use};
-use tercel_data::table::{Scan, Track};
+use tercel_data::table::{Description, Scan, Track};
 
 use crate::PipelineError;
-use crate::config::{Config, OutOfOrder};
+use crate::config::{ClockSetBack, Config, OutOfOrder};
 use crate::engine::{Engine, Outcome, engine};
-use crate::reorder::Reorder;
+use crate::names::Names;
+use crate::notice::Notice;
+use crate::reorder::{Arrival, Order, Reorder};
 use crate::sensors::Station;
+use crate::turns::Look;
+use crate::understood;
 
 /// The tracker that a configuration describes. See the [crate] for an example.
 pub struct Pipeline {
     engine: Box<dyn Engine>,
-    stations: BTreeMap<String, Station>,
+    stations: HashMap<Arc<str>, Station>,
     ignore: Vec<String>,
     reorder: Reorder,
+    names: Names,
     labels: Vec<String>,
     modes: Vec<String>,
     summary: Summary,
     confirmed: BTreeSet<u64>,
+    /// The largest number of a track, and what is added to those of an engine that started anew.
+    numbers: (u64, u64),
     /// Tracks of scans that were released before one that was refused; they come with the next call.
     held: Vec<Track>,
+    notices: Vec<Notice>,
     config: Config,
 }
 
@@ -33,8 +42,16 @@ pub struct Summary {
     pub scans: u64,
     /// Scans that came too late and were left out.
     pub late: u64,
+    /// Scans that were set aside because their times are far ahead of all others.
+    pub ahead: u64,
     /// Scans of sensors that the configuration leaves out.
     pub ignored: u64,
+    /// Detections of scans that came too late.
+    pub late_detections: u64,
+    /// Detections of scans that were set aside.
+    pub ahead_detections: u64,
+    /// Detections of sensors that the configuration leaves out.
+    pub ignored_detections: u64,
     /// Detections that updated a track.
     pub updates: u64,
     /// Detections that started a tentative track.
@@ -54,22 +71,31 @@ impl Pipeline {
     /// # Errors
     /// When a value of the configuration makes no tracker; the message names its key.
     pub fn new(config: &Config) -> Result<Self, PipelineError> {
-        let station = |(name, sensor): (&String, _)| Ok((name.clone(), Station::new(name, sensor)?));
-        let delay = match config.input.out_of_order {
-            OutOfOrder::Drop => 0.0,
-            OutOfOrder::Buffer => config.input.delay.get(),
+        let station =
+            |(name, sensor): (&String, _)| Ok((Arc::from(name.as_str()), Station::new(name, sensor)?));
+        let input = &config.input;
+        let order = Order {
+            delay: match input.out_of_order {
+                OutOfOrder::Drop => 0.0,
+                OutOfOrder::Buffer => input.delay.get(),
+            },
+            max_jump: input.max_jump.get(),
+            restart: input.clock_set_back == ClockSetBack::Restart,
         };
         let engine = engine(config)?;
         Ok(Pipeline {
             modes: engine.modes(),
             engine,
             stations: config.sensors.iter().map(station).collect::<Result<_, PipelineError>>()?,
-            ignore: config.input.ignore.clone(),
-            reorder: Reorder::new(delay),
+            ignore: input.ignore.clone(),
+            reorder: Reorder::new(order),
+            names: Names::default(),
             labels: config.motion.labels().iter().map(ToString::to_string).collect(),
             summary: Summary::default(),
             confirmed: BTreeSet::new(),
+            numbers: (0, 0),
             held: Vec::new(),
+            notices: Vec::new(),
             config: config.clone(),
         })
     }
@@ -89,9 +115,37 @@ impl Pipeline {
         self.summary
     }
 
-    /// Takes in a scan and returns the tracks after each scan that it released, with their detections.
+    /// What a user should be told since the last call.
+    pub fn notices(&mut self) -> Vec<Notice> {
+        std::mem::take(&mut self.notices)
+    }
+
+    /// Looks ahead at a recording: at what is said of its sensors and at its first scans. Sensors of which the configuration does
+    /// not say so are then taken as reports, or as antennas that turn, where the recording says or shows that. Without this call,
+    /// as with a stream, they scan.
     ///
-    /// With `out_of_order = "buffer"` a scan is held back and its tracks come with a later one.
+    /// # Errors
+    /// When a sensor is not described.
+    pub fn expect(&mut self, description: &Description, first: &[Scan]) -> Result<(), PipelineError> {
+        for name in understood::sensors(description, first) {
+            if self.ignore.iter().any(|ignored| **ignored == *name) {
+                continue;
+            }
+            let config = self.config.sensors.get(&*name).or_else(|| self.config.sensors.get(DEFAULT));
+            let Some(config) = config.cloned() else { continue };
+            let Some(found) = understood::sensor(&name, &config, description, first) else { continue };
+            let station = self.station(&name, first.first().map_or(0.0, |scan| scan.time))?;
+            let notice = found.apply(&name, station);
+            self.notices.extend(notice);
+        }
+        Ok(())
+    }
+
+    /// Takes in a scan and returns the tracks after each scan that it released, with their detections: those that the scan
+    /// concerned, which are all of them unless its detections are reports.
+    ///
+    /// With `out_of_order = "buffer"` a scan is held back and its tracks come with a later one, as are plots of an antenna that
+    /// turns until a sector is complete.
     ///
     /// # Errors
     /// When the sensor is not described, a detection does not hold what the sensor measures, or a number is not finite. That
@@ -99,16 +153,25 @@ impl Pipeline {
     pub fn push(&mut self, scan: Scan) -> Result<Vec<Track>, PipelineError> {
         if self.ignore.iter().any(|name| **name == *scan.sensor) {
             self.summary.ignored += 1;
+            self.summary.ignored_detections += scan.detections.len() as u64;
             return Ok(Vec::new());
         }
-        self.station(&scan)?;
-        if !scan.time.is_finite() {
-            let source = tercel_core::multi::TrackerError::Time { time: scan.time };
+        let time = scan.time;
+        let station = self.station(&scan.sensor, time)?;
+        if !time.is_finite() {
+            let source = tercel_core::multi::TrackerError::Time { time };
             return Err(PipelineError::Tracker { sensor: scan.sensor.to_string(), source });
         }
-        if self.reorder.push(scan).is_some() {
-            self.summary.late += 1;
+        match &mut station.turns {
+            Some(turns) => {
+                let place = scan.position.map_or(station.position, |[x, y, _]| [x, y].into());
+                for look in turns.push(scan, place) {
+                    self.arrange(look)?;
+                }
+            }
+            None => self.arrange(scan.into())?,
         }
+        self.close_turns(time)?;
         self.release(false)
     }
 
@@ -117,42 +180,98 @@ impl Pipeline {
     /// # Errors
     /// As [`push`](Pipeline::push).
     pub fn finish(&mut self) -> Result<Vec<Track>, PipelineError> {
+        self.close_turns(f64::INFINITY)?;
+        if let Some((notice, look)) = self.reorder.finish() {
+            self.leave_out(notice, &look);
+        }
         self.release(true)
     }
 
+    /// Ends the turns of antennas from which nothing has come for a while.
+    fn close_turns(&mut self, time: f64) -> Result<(), PipelineError> {
+        let turning = self.stations.values_mut().filter_map(|station| station.turns.as_mut());
+        let mut over: Vec<Look> = turning.filter_map(|turns| turns.overdue(time)).collect();
+        over.sort_by(|a, b| {
+            a.scan.time.total_cmp(&b.scan.time).then_with(|| a.scan.sensor.cmp(&b.scan.sensor))
+        });
+        over.into_iter().try_for_each(|look| self.arrange(look))
+    }
+
+    /// Puts a scan in its place among those that wait.
+    fn arrange(&mut self, look: Look) -> Result<(), PipelineError> {
+        match self.reorder.push(look) {
+            Arrival::Taken => {}
+            Arrival::LeftOut(notice, look) => self.leave_out(notice, &look),
+            Arrival::Restarted(notice, [scans, detections]) => {
+                self.summary.late -= scans;
+                self.summary.late_detections -= detections;
+                self.notices.push(notice);
+                self.engine = engine(&self.config)?;
+                self.numbers.1 = self.numbers.0;
+            }
+        }
+        Ok(())
+    }
+
+    fn leave_out(&mut self, notice: Notice, look: &Look) {
+        let detections = look.scan.detections.len() as u64;
+        if let Notice::Ahead { .. } = notice {
+            self.summary.ahead += 1;
+            self.summary.ahead_detections += detections;
+        } else {
+            self.summary.late += 1;
+            self.summary.late_detections += detections;
+        }
+        self.notices.push(notice);
+    }
+
     fn release(&mut self, all: bool) -> Result<Vec<Track>, PipelineError> {
-        while let Some(scan) = self.reorder.pop(all) {
-            let rows = self.track(&scan)?;
-            self.held.extend(rows);
+        let turning = self.stations.values().filter_map(|station| station.turns.as_ref());
+        let oldest = turning.map(|turns| turns.oldest()).fold(f64::INFINITY, f64::min);
+        while let Some(look) = self.reorder.pop(all, oldest) {
+            let rows = self.track(&look)?;
+            if self.held.is_empty() {
+                self.held = rows;
+            } else {
+                self.held.extend(rows);
+            }
         }
         Ok(std::mem::take(&mut self.held))
     }
 
-    fn track(&mut self, scan: &Scan) -> Result<Vec<Track>, PipelineError> {
-        let name = self.station(scan)?;
-        let Some(station) = self.stations.get_mut(&name) else { return Ok(Vec::new()) };
-        station.move_to(scan);
-        let outcome = self.engine.step(station, scan)?;
+    fn track(&mut self, look: &Look) -> Result<Vec<Track>, PipelineError> {
+        let Some(station) = self.stations.get_mut(&look.scan.sensor) else { return Ok(Vec::new()) };
+        station.move_to(&look.scan);
+        let mut outcome = self.engine.step(station, look, &mut self.names)?;
         learn(station, &outcome);
+        if self.numbers.1 > 0 {
+            outcome.rows.iter_mut().for_each(|row| row.track += self.numbers.1);
+        }
         self.count(&outcome);
         Ok(outcome.rows)
     }
 
-    /// Name of the section that describes the sensor of a scan; one made from the default section if it has none.
-    fn station(&mut self, scan: &Scan) -> Result<String, PipelineError> {
-        let name = scan.sensor.to_string();
-        if !self.stations.contains_key(&name) {
+    /// What serves a sensor: the section of its name, or one made from the default section if it has none.
+    fn station(&mut self, name: &Arc<str>, time: f64) -> Result<&mut Station, PipelineError> {
+        if !self.stations.contains_key(name) {
             let Some(sensor) = self.config.sensors.get(DEFAULT) else {
-                return Err(PipelineError::UnknownSensor { time: scan.time, sensor: name });
+                return Err(PipelineError::UnknownSensor { time, sensor: name.to_string() });
             };
-            self.stations.insert(name.clone(), Station::new(&name, sensor)?);
+            self.stations.insert(Arc::clone(name), Station::new(name, sensor)?);
         }
-        Ok(name)
+        // It is there now.
+        self.stations
+            .get_mut(name)
+            .ok_or_else(|| PipelineError::UnknownSensor { time, sensor: name.to_string() })
     }
 
     fn count(&mut self, outcome: &Outcome) {
-        let believed = outcome.rows.iter().filter(|row| row.status == Status::Confirmed);
-        self.confirmed.extend(believed.map(|row| row.track));
+        for row in &outcome.rows {
+            self.numbers.0 = self.numbers.0.max(row.track);
+            if row.status == Status::Confirmed {
+                self.confirmed.insert(row.track);
+            }
+        }
         let summary = &mut self.summary;
         summary.confirmed = self.confirmed.len() as u64;
         summary.scans += 1;
@@ -168,7 +287,6 @@ impl Pipeline {
 
 /// Teaches the clutter map of a sensor with its detections, each in the measure in which no track explains it.
 fn learn(station: &mut Station, outcome: &Outcome) {
-    let detection = station.detection();
     let Clutter::Map(map) = &mut station.clutter else { return };
     let doubt = |id: u64| {
         let row = outcome.rows.binary_search_by_key(&id, |row| row.track);
@@ -178,5 +296,5 @@ fn learn(station: &mut Station, outcome: &Outcome) {
         Use::Updated(id) => Some(((*place)?, doubt(*id))),
         Use::Started(_) | Use::Clutter => Some(((*place)?, 1.0)),
     });
-    map.learn(unexplained, &detection);
+    map.learn(unexplained, &station.detection);
 }

@@ -1,5 +1,7 @@
 //! From a sensor section and a scan to a sensor and its measurements.
 
+use std::borrow::Cow;
+
 use nalgebra::{SMatrix, Vector2, vector};
 use tercel_core::error::FilterError;
 use tercel_core::multi::{Clutter, ClutterMap, Detection};
@@ -9,17 +11,23 @@ use tercel_core::sensor::{
 use tercel_data::table::{self, Observation, Scan};
 
 use crate::PipelineError;
-use crate::config::{ClutterConfig, DetectionConfig, Measures, SensorConfig};
+use crate::carrier::{Carrier, Velocity};
+use crate::config::{ClutterConfig, DetectionConfig, Measures, SensorConfig, SensorKind};
+use crate::turns::Turns;
 
 /// A sensor of the configuration, with what was learned of its clutter.
 pub(crate) struct Station {
     pub kind: Kind,
+    /// How it sees, from where it stands.
     pub detection: Detection,
     pub clutter: Clutter,
+    /// Probability that a detection names its object rightly.
+    pub reliability: f64,
+    /// Its plots, where they are gathered while an antenna turns.
+    pub turns: Option<Turns>,
     /// Where it stands unless a scan says.
     pub position: Vector2<f64>,
-    /// Where it stood in the last scan, for its velocity.
-    pub last: Option<(f64, Vector2<f64>)>,
+    carrier: Carrier,
 }
 
 /// What it measures.
@@ -37,36 +45,53 @@ impl Station {
         let key = format!("sensors.{name}");
         let within =
             |part: &str, error: FilterError| PipelineError::parameter(&format!("{key}.{part}"), &error);
+        let position: Vector2<f64> = config.position.into();
+        let seen = match (config.kind, &config.detection) {
+            (SensorKind::Reports, _) => Detection::reports(),
+            (_, Some(table)) => detection(table).map_err(|error| within("detection", error))?,
+            (_, None) => {
+                detection(&DetectionConfig::default()).map_err(|error| within("detection", error))?
+            }
+        };
         Ok(Station {
-            kind: Kind::new(&config.measures).map_err(|error| within("measures", error))?,
-            detection: detection(&config.detection).map_err(|error| within("detection", error))?,
+            kind: Kind::new(&config.measures)
+                .map_err(|error| within("measures", error))?
+                .at(position, Velocity::NONE),
+            detection: seen.at(position),
             clutter: clutter(&config.clutter).map_err(|error| within("clutter", error))?,
-            position: config.position.into(),
-            last: None,
+            reliability: config.identity.reliability.get(),
+            turns: config.scans.as_ref().map(|turn| Turns::new(turn.period.get())),
+            position,
+            carrier: Carrier::new(config.position_deviation.get()),
         })
     }
 
-    /// Moves the sensor to where the scan says it is.
+    /// Takes its detections as reports from now on.
+    pub fn report(&mut self) {
+        self.detection = Detection::reports();
+    }
+
+    /// Moves the sensor to where the scan says it is. Its velocity is that of the scan, or follows from its last places.
     pub fn move_to(&mut self, scan: &Scan) {
         let Some([x, y, _]) = scan.position else { return };
         self.position = vector![x, y];
-        let velocity = match self.last {
-            Some((time, position)) if scan.time > time => (self.position - position) / (scan.time - time),
-            _ => Vector2::zeros(),
+        let velocity = match scan.velocity {
+            Some([vx, vy, _]) => Velocity { value: vector![vx, vy], deviation: 0.0 },
+            None => {
+                self.carrier.fix(scan.time, self.position);
+                self.carrier.velocity()
+            }
         };
-        self.last = Some((scan.time, self.position));
-        self.kind = match self.kind {
-            Kind::Position(sensor) => Kind::Position(sensor),
-            Kind::Converted(sensor) => Kind::Converted(sensor.at(self.position)),
-            Kind::RangeBearing(sensor) => Kind::RangeBearing(sensor.at(self.position)),
-            Kind::RangeBearingRate(sensor) => Kind::RangeBearingRate(sensor.at(self.position, velocity)),
-            Kind::Bearing(sensor) => Kind::Bearing(sensor.at(self.position)),
-        };
+        self.detection = std::mem::replace(&mut self.detection, Detection::reports()).at(self.position);
+        self.kind = self.kind.at(self.position, velocity);
     }
 
-    /// How likely it sees an object, from where it stands.
-    pub fn detection(&self) -> Detection {
-        self.detection.clone().at(self.position)
+    /// How it sees in a scan that looked at this sector.
+    pub fn looking(&self, sector: Option<(f64, f64)>) -> Cow<'_, Detection> {
+        match sector {
+            Some((from, width)) => Cow::Owned(self.detection.clone().looking(from, width)),
+            None => Cow::Borrowed(&self.detection),
+        }
     }
 }
 
@@ -89,6 +114,17 @@ fn clutter(config: &ClutterConfig) -> Result<Clutter, FilterError> {
 }
 
 impl Kind {
+    /// The same sensor at another place, and in motion.
+    fn at(self, place: Vector2<f64>, velocity: Velocity) -> Self {
+        match self {
+            Kind::Position(sensor) => Kind::Position(sensor),
+            Kind::Converted(sensor) => Kind::Converted(sensor.at(place)),
+            Kind::RangeBearing(sensor) => Kind::RangeBearing(sensor.at(place)),
+            Kind::RangeBearingRate(sensor) => Kind::RangeBearingRate(sensor.at(place, velocity.value)),
+            Kind::Bearing(sensor) => Kind::Bearing(sensor.at(place)),
+        }
+    }
+
     fn new(measures: &Measures) -> Result<Self, FilterError> {
         Ok(match measures {
             Measures::Position(position) => {
@@ -120,10 +156,10 @@ impl Kind {
 
 /// The detections of a scan as positions.
 pub(crate) fn positions(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> {
-    collect(scan, "position", "polar", |detection| match detection.observation {
+    collect(scan, "position", "polar", |detection, age| match detection.observation {
         Observation::Position { x, y, .. } => {
             let noise = diagonal([detection.noise.x, detection.noise.y]);
-            Some(Measurement { value: vector![x, y], noise, age: 0.0 })
+            Some(Measurement { value: vector![x, y], noise, age })
         }
         Observation::Polar { .. } => None,
     })
@@ -131,10 +167,10 @@ pub(crate) fn positions(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineErro
 
 /// The detections of a scan as ranges and bearings.
 pub(crate) fn ranges(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> {
-    collect(scan, "range and bearing", "position", |detection| match detection.observation {
+    collect(scan, "range and bearing", "position", |detection, age| match detection.observation {
         Observation::Polar { range: Some(range), bearing, .. } => {
             let noise = diagonal([detection.noise.range, detection.noise.bearing]);
-            Some(Measurement { value: vector![range, bearing], noise, age: 0.0 })
+            Some(Measurement { value: vector![range, bearing], noise, age })
         }
         _ => None,
     })
@@ -142,11 +178,11 @@ pub(crate) fn ranges(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> 
 
 /// The detections of a scan as ranges, bearings and range rates.
 pub(crate) fn range_rates(scan: &Scan) -> Result<Vec<Measurement<3>>, PipelineError> {
-    collect(scan, "range, bearing and range rate", "position", |detection| match detection.observation {
+    collect(scan, "range, bearing and range rate", "position", |detection, age| match detection.observation {
         Observation::Polar { range: Some(range), bearing, range_rate: Some(rate) } => {
             let noise =
                 diagonal([detection.noise.range, detection.noise.bearing, detection.noise.range_rate]);
-            Some(Measurement { value: vector![range, bearing, rate], noise, age: 0.0 })
+            Some(Measurement { value: vector![range, bearing, rate], noise, age })
         }
         _ => None,
     })
@@ -154,12 +190,10 @@ pub(crate) fn range_rates(scan: &Scan) -> Result<Vec<Measurement<3>>, PipelineEr
 
 /// The detections of a scan as bearings.
 pub(crate) fn bearings(scan: &Scan) -> Result<Vec<Measurement<1>>, PipelineError> {
-    collect(scan, "bearing", "position", |detection| match detection.observation {
-        Observation::Polar { bearing, .. } => Some(Measurement {
-            value: vector![bearing],
-            noise: diagonal([detection.noise.bearing]),
-            age: 0.0,
-        }),
+    collect(scan, "bearing", "position", |detection, age| match detection.observation {
+        Observation::Polar { bearing, .. } => {
+            Some(Measurement { value: vector![bearing], noise: diagonal([detection.noise.bearing]), age })
+        }
         Observation::Position { .. } => None,
     })
 }
@@ -170,10 +204,11 @@ fn collect<const M: usize>(
     scan: &Scan,
     expected: &'static str,
     instead: &str,
-    measure: impl Fn(&table::Detection) -> Option<Measurement<M>>,
+    measure: impl Fn(&table::Detection, f64) -> Option<Measurement<M>>,
 ) -> Result<Vec<Measurement<M>>, PipelineError> {
     let one = |detection: &table::Detection| {
-        measure(detection).ok_or_else(|| PipelineError::Observation {
+        let age = detection.time.map_or(0.0, |time| scan.time - time);
+        measure(detection, age).ok_or_else(|| PipelineError::Observation {
             time: scan.time,
             sensor: scan.sensor.to_string(),
             detection: detection.id,

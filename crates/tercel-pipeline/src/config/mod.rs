@@ -21,8 +21,8 @@ pub use filter::{Estimator, FilterConfig};
 pub use motion::{AccelerationModel, LearnedMotion, MotionConfig, Singer, Switching, TurnModel};
 pub use number::{Count, NonNegative, Positive, Probability};
 pub use sensor::{
-    Bearing, ClutterConfig, DetectionConfig, MapClutter, Measures, Polar, PositionSensor, SensorConfig,
-    UniformClutter,
+    Bearing, ClutterConfig, DetectionConfig, IdentityConfig, MapClutter, Measures, Polar, PositionSensor,
+    SensorConfig, SensorKind, TurnConfig, UniformClutter,
 };
 pub use tracker::{
     ConfirmConfig, HitsConfig, ManagementConfig, NearestNeighbourConfig, PhdConfig, TrackerConfig,
@@ -49,7 +49,7 @@ pub struct Config {
 }
 
 /// What comes in.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct InputConfig {
     /// Names of sensors whose scans are left out.
@@ -59,6 +59,35 @@ pub struct InputConfig {
     /// With `out_of_order = "buffer"`: how long scans are held back, so that late ones can take their place.
     #[schemars(extend("x-unit" = "s"))]
     pub delay: NonNegative,
+    /// A single scan that is further ahead of the others is set aside and counted: its time is wrong. One that the next scan
+    /// confirms is taken.
+    #[schemars(extend("x-unit" = "s"))]
+    pub max_jump: Positive,
+    /// What happens when a clock is set back, so that all scans come too late.
+    pub clock_set_back: ClockSetBack,
+}
+
+impl Default for InputConfig {
+    fn default() -> Self {
+        InputConfig {
+            ignore: Vec::new(),
+            out_of_order: OutOfOrder::default(),
+            delay: NonNegative::constant(0.0),
+            max_jump: Positive::constant(3600.0),
+            clock_set_back: ClockSetBack::default(),
+        }
+    }
+}
+
+/// What happens when a clock is set back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ClockSetBack {
+    /// The scans are left out and counted until the old time is reached.
+    #[default]
+    Drop,
+    /// Tracking starts anew after three scans in a row that are too late, with new tracks.
+    Restart,
 }
 
 /// What happens to a scan that is older than one before it.

@@ -12,15 +12,69 @@ use crate::PipelineError;
 pub struct SensorConfig {
     /// What it measures, and how accurately.
     pub measures: Measures,
+    /// What its detections are.
+    #[serde(default)]
+    pub kind: SensorKind,
+    /// How detections with times of their own become scans: an antenna that turns paints its circle over seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scans: Option<TurnConfig>,
+    /// What the identities are worth that come with its detections: ship numbers, addresses, codes, the numbers of its tracks.
+    #[serde(default)]
+    pub identity: IdentityConfig,
     /// Where it stands in the local frame (x, y), unless the data say.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub position: [f64; 2],
-    /// How likely it sees an object that is there.
-    #[serde(default)]
-    pub detection: DetectionConfig,
+    /// Standard deviation of its own position where the data say it, per axis: how well its velocity is known.
+    #[serde(default = "five_metres")]
+    #[schemars(extend("x-unit" = "m"))]
+    pub position_deviation: NonNegative,
+    /// How likely it sees an object that is there. Not for reports.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detection: Option<DetectionConfig>,
     /// How many of its detections come from no object.
     pub clutter: ClutterConfig,
+}
+
+fn five_metres() -> NonNegative {
+    NonNegative::constant(5.0)
+}
+
+/// What the detections of a sensor are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorKind {
+    /// What the recording says; without a word of it, scans.
+    #[default]
+    Auto,
+    /// Scans: a look at a part of the world, in which an object that is not seen was missed.
+    Scans,
+    /// Reports: each speaks of one object and says nothing of others (AIS, ADS-B, GPS).
+    Reports,
+}
+
+/// A sensor that turns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TurnConfig {
+    /// Time for a turn. Plots are gathered sector by sector once their bearings show how the antenna turns, until then turn by turn.
+    #[schemars(extend("x-unit" = "s"))]
+    pub period: Positive,
+}
+
+/// What identities are worth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct IdentityConfig {
+    /// Probability that a detection names its object rightly; 0 takes no notice of identities.
+    #[schemars(extend("x-unit" = "1"))]
+    pub reliability: Probability,
+}
+
+impl Default for IdentityConfig {
+    fn default() -> Self {
+        IdentityConfig { reliability: Probability::constant(0.999) }
+    }
 }
 
 /// What a sensor measures.
@@ -156,7 +210,16 @@ impl SensorConfig {
         if !self.position.iter().all(|x| x.is_finite()) {
             return Err(PipelineError::config(&format!("{key}.position"), "must be finite"));
         }
-        if let DetectionConfig::ByRange(table) = &self.detection {
+        if self.identity.reliability.get() >= 1.0 {
+            let reason = "must be below 1: a sensor that cannot err leaves no way to correct it; 0.999999 is nearly sure";
+            return Err(PipelineError::config(&format!("{key}.identity.reliability"), reason));
+        }
+        if self.kind == SensorKind::Reports && (self.scans.is_some() || self.detection.is_some()) {
+            let without = if self.scans.is_some() { "scans" } else { "detection" };
+            let reason = "has no effect on reports, none of which is ever missed; leave it out, or the kind";
+            return Err(PipelineError::config(&format!("{key}.{without}"), reason));
+        }
+        if let Some(DetectionConfig::ByRange(table)) = &self.detection {
             let key = format!("{key}.detection");
             if table.is_empty() {
                 return Err(PipelineError::config(&key, "the table is empty"));
