@@ -121,6 +121,12 @@ pub enum DataError {
         /// What to do.
         help: String,
     },
+    /// Tracks cannot be drawn on a map, because nothing says where on the Earth their local frame lies.
+    #[error("{file}: a map needs latitude and longitude, and the tracks have only `x` and `y`")]
+    NoOrigin {
+        /// The file that was to be written.
+        file: Arc<str>,
+    },
     /// One cell of the table is not what its column holds.
     #[error("{place}: column `{column}` is {value}; expected {expected}")]
     Value {
@@ -153,6 +159,9 @@ impl DataError {
         match self {
             DataError::Io { .. } => None,
             DataError::Empty { .. } => Some("check that the program that wrote it came to its end"),
+            DataError::NoOrigin { .. } => {
+                Some("say where on the Earth x = 0, y = 0 is: --origin LAT,LON; or write a table: .csv, .parquet, .ndjson")
+            }
             DataError::UnknownFormat { .. } => Some("rename the file, or name the format: --from csv"),
             DataError::Corrupt { help, .. } | DataError::Row { help, .. } => Some(*help),
             DataError::MissingColumns { help, .. }

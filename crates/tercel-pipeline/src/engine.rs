@@ -204,6 +204,7 @@ fn rows<const N: usize, B: Clone>(
             covariance: upper.map(|index| estimate.covariance[index]).collect(),
             modes: estimate.modes,
             extent: None,
+            altitude: None,
             identity: None,
             detection: track.measurement.map(|number| scan.detections[number].id),
         })

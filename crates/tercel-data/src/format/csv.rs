@@ -3,8 +3,8 @@
 use std::io::{BufRead, Write};
 use std::sync::Arc;
 
-use super::{Content, Plan, read_error, write_number};
-use crate::column::Column;
+use super::{Content, Plan, read_error, write_rounded};
+use crate::column::{Column, Written};
 use crate::error::{DataError, Place};
 use crate::layout::Layout;
 use crate::metadata::Metadata;
@@ -143,19 +143,19 @@ impl<W: Write> Writer<W> {
 
     pub fn write(&mut self, sheet: &Sheet, file: &Arc<str>) -> Result<(), DataError> {
         for row in 0..sheet.len() {
-            for values in &sheet.values {
-                self.write_cell(values, row).map_err(|error| write_error(error, file))?;
+            for (column, values) in sheet.columns.iter().zip(&sheet.values) {
+                self.write_cell(values, row, column.written).map_err(|error| write_error(error, file))?;
             }
             self.writer.write_record(None::<&[u8]>).map_err(|error| write_error(error, file))?;
         }
         Ok(())
     }
 
-    fn write_cell(&mut self, values: &Values, row: usize) -> csv::Result<()> {
+    fn write_cell(&mut self, values: &Values, row: usize, written: Written) -> csv::Result<()> {
         self.cell.clear();
         match values {
             Values::Real(cells) => {
-                cells[row].map_or(Ok(()), |number| write_number(number, &mut self.cell))?
+                cells[row].map_or(Ok(()), |number| write_rounded(number, written, &mut self.cell))?
             }
             Values::Count(cells) => cells[row].map_or(Ok(()), |number| write!(self.cell, "{number}"))?,
             Values::Text(cells) => self.cell.extend(cells[row].iter().flat_map(|text| text.bytes())),

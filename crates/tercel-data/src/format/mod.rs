@@ -4,6 +4,7 @@ pub(crate) mod csv;
 mod guard;
 pub(crate) mod json;
 pub(crate) mod parquet;
+mod rounded;
 
 use std::collections::HashSet;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -120,7 +121,7 @@ impl Plan {
         let columns = options.relaxed(T::columns(&metadata));
         no_repetition(&columns, file)?;
         metadata.check_units(&columns, options.angles, file)?;
-        let columns = match_header(found, columns, file)?;
+        let columns = match_header(found, columns, &T::written(&metadata), file)?;
         Ok(Plan { metadata, columns })
     }
 
@@ -227,6 +228,8 @@ impl<W: Write + Send> SheetWriter<W> {
         }
     }
 }
+
+pub(crate) use rounded::write_rounded;
 
 /// Writes a number so that reading it gives the same bits, and very large and small ones stay short.
 pub(crate) fn write_number(number: f64, text: &mut Vec<u8>) -> std::io::Result<()> {

@@ -16,6 +16,7 @@ use parquet::arrow::{ArrowWriter, ProjectionMask};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use parquet::schema::types::ColumnPath;
 
 use super::guard::guarded;
 use super::{Content, Plan, read_error};
@@ -178,7 +179,13 @@ impl<W: Write + Send> Writer<W> {
             .map(|column| Field::new(column.name.as_ref(), data_type(column.kind), !column.needed))
             .collect();
         let schema = Arc::new(Schema::new(fields));
-        let properties = WriterProperties::builder()
+        // Measured and estimated numbers hardly repeat: a dictionary of them costs time and saves nothing.
+        let plain = columns.iter().filter(|column| matches!(column.kind, Kind::Real(_)));
+        let properties = plain
+            .map(|column| ColumnPath::new(vec![column.name.to_string()]))
+            .fold(WriterProperties::builder(), |builder, path| {
+                builder.set_column_dictionary_enabled(path, false)
+            })
             .set_compression(Compression::ZSTD(ZstdLevel::default()))
             .set_created_by(concat!("tercel ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(vec![KeyValue::new(KEY.to_owned(), json)]))
