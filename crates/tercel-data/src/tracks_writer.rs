@@ -48,7 +48,7 @@ pub struct TracksWriter<'a> {
 
 enum Kind<'a> {
     Table(Box<Table<'a>>),
-    Map(MapWriter, AtomicFile),
+    Map(Box<MapWriter>),
 }
 
 /// A table that is being written.
@@ -87,8 +87,7 @@ impl<'a> TracksWriter<'a> {
     pub fn create(path: impl AsRef<Path>, head: &Tracks) -> Result<Self, DataError> {
         let path = path.as_ref();
         if let Some(format) = MapFormat::of(path) {
-            let map = MapWriter::new(format, head, path)?;
-            let kind = Kind::Map(map, AtomicFile::create(path)?);
+            let kind = Kind::Map(Box::new(MapWriter::new(format, head, path)?));
             let mut tracks = TracksWriter { kind, file: file_name(path) };
             tracks.append(&head.rows)?;
             return Ok(tracks);
@@ -129,7 +128,7 @@ impl<'a> TracksWriter<'a> {
     /// Row numbers in errors count within the call.
     pub fn append(&mut self, rows: &[Track]) -> Result<(), DataError> {
         match &mut self.kind {
-            Kind::Map(map, _) => map.append(rows),
+            Kind::Map(map) => map.append(rows),
             Kind::Table(table) => {
                 table.sheet.clear();
                 table.columns.fill(&mut table.sheet, rows, &self.file)?;
@@ -144,7 +143,7 @@ impl<'a> TracksWriter<'a> {
     /// When the system refuses.
     pub fn flush(&mut self) -> Result<(), DataError> {
         match &mut self.kind {
-            Kind::Map(..) => Ok(()),
+            Kind::Map(_) => Ok(()),
             Kind::Table(table) => table.writer.flush(&self.file),
         }
     }
@@ -152,7 +151,7 @@ impl<'a> TracksWriter<'a> {
     /// What is not in the file, or in another way than in the rows, for the person who asked for it: sentences.
     pub fn notes(&self) -> Vec<String> {
         match &self.kind {
-            Kind::Map(map, _) => map.notes(),
+            Kind::Map(map) => map.notes(),
             Kind::Table(_) => Vec::new(),
         }
     }
@@ -163,10 +162,7 @@ impl<'a> TracksWriter<'a> {
     /// When the system refuses; the file is then not there.
     pub fn finish(self) -> Result<(), DataError> {
         match self.kind {
-            Kind::Map(map, mut file) => {
-                map.write(&mut file)?;
-                file.finish()
-            }
+            Kind::Map(map) => map.finish(),
             Kind::Table(table) => match table.writer.finish(&self.file)? {
                 Sink::File(file) => file.finish(),
                 Sink::Stream(mut stream) => {

@@ -6,12 +6,12 @@ mod gpx;
 mod kml;
 mod path;
 
-use std::io::Write;
 use std::path::Path as FilePath;
 use std::sync::Arc;
 
 use crate::error::DataError;
 use crate::format::file_name;
+use crate::output::AtomicFile;
 use crate::table::{Track, Tracks};
 
 use self::clock::Clock;
@@ -49,21 +49,22 @@ impl MapFormat {
 pub(crate) struct MapWriter {
     format: MapFormat,
     paths: Paths,
-    file: Arc<str>,
+    name: Arc<str>,
+    file: AtomicFile,
 }
 
 impl MapWriter {
     /// Begins a map with the origin and labels of `head`; its rows are not looked at.
     pub fn new(format: MapFormat, head: &Tracks, path: &FilePath) -> Result<Self, DataError> {
-        let file = file_name(path);
+        let name = file_name(path);
         match Paths::new(head) {
-            Some(paths) => Ok(MapWriter { format, paths, file }),
-            None => Err(DataError::NoOrigin { file }),
+            Some(paths) => Ok(MapWriter { format, paths, name, file: AtomicFile::create(path)? }),
+            None => Err(DataError::NoOrigin { file: name }),
         }
     }
 
     pub fn append(&mut self, rows: &[Track]) -> Result<(), DataError> {
-        rows.iter().try_for_each(|row| self.paths.add(row, &self.file))
+        rows.iter().try_for_each(|row| self.paths.add(row, &self.name))
     }
 
     /// What a reader of the map should know.
@@ -72,7 +73,7 @@ impl MapWriter {
         if self.paths.out_of_reach > 0 {
             notes.push(format!(
                 "{}: {} rows are too far from the origin for a map and are not on it",
-                self.file, self.paths.out_of_reach
+                self.name, self.paths.out_of_reach
             ));
         }
         if self.paths.clock() == Clock::Seconds {
@@ -80,20 +81,21 @@ impl MapWriter {
                 MapFormat::GeoJson => "are seconds on the map, too",
                 MapFormat::Kml | MapFormat::Gpx => "are left out",
             };
-            notes.push(format!("{}: the times are no Unix times and {without}", self.file));
+            notes.push(format!("{}: the times are no Unix times and {without}", self.name));
         }
         notes
     }
 
-    /// Writes the file.
-    pub fn write(&self, sink: &mut dyn Write) -> Result<(), DataError> {
+    /// Writes the file and puts it in its place.
+    pub fn finish(mut self) -> Result<(), DataError> {
         let (clock, paths) = (self.paths.clock(), self.paths.complete());
         let written = match self.format {
-            MapFormat::GeoJson => geojson::write(sink, paths, clock),
-            MapFormat::Kml => kml::write(sink, paths, clock),
-            MapFormat::Gpx => gpx::write(sink, paths, clock),
+            MapFormat::GeoJson => geojson::write(&mut self.file, paths, clock),
+            MapFormat::Kml => kml::write(&mut self.file, paths, clock),
+            MapFormat::Gpx => gpx::write(&mut self.file, paths, clock),
         };
-        written.map_err(|error| DataError::io(&self.file, "write", error))
+        written.map_err(|error| DataError::io(&self.name, "write", error))?;
+        self.file.finish()
     }
 }
 
