@@ -34,7 +34,9 @@ mod npy;
 mod options;
 mod output;
 mod read;
+mod remarks;
 mod sheet;
+mod source;
 pub mod table;
 mod write;
 

@@ -5,10 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::DataError;
-use crate::format::{Format, SheetWriter, file_name};
+use crate::format::{Format, SheetWriter};
 use crate::layout::{Layout, fill_tracks, track_columns};
 use crate::output::AtomicFile;
 use crate::sheet::Sheet;
+use crate::source::file_name;
 use crate::table::{Detections, Metrics, Track, Tracks, Truths};
 
 fn to_path<T: Layout>(path: &Path, table: &T) -> Result<(), DataError> {
