@@ -65,6 +65,16 @@ pub enum DataError {
         /// What to do.
         help: &'static str,
     },
+    /// What is there cannot be used as it is, but an option or another program settles it.
+    #[error("{place}: {problem}")]
+    Unsettled {
+        /// Where.
+        place: Place,
+        /// What stands in the way.
+        problem: String,
+        /// What to do.
+        help: String,
+    },
     /// The name of a file does not tell its format.
     #[error("{file}: the name does not tell the format; known are {known}")]
     UnknownFormat {
@@ -167,6 +177,7 @@ impl DataError {
             DataError::MissingColumns { help, .. }
             | DataError::Column { help, .. }
             | DataError::Unit { help, .. }
+            | DataError::Unsettled { help, .. }
             | DataError::Metadata { help, .. } => Some(help.as_str()),
             DataError::Value { help, .. } => help.as_deref(),
         }
@@ -176,6 +187,10 @@ impl DataError {
     /// True when the operating system refused, as opposed to content that is wrong.
     pub fn is_io(&self) -> bool {
         matches!(self, DataError::Io { .. })
+    }
+
+    pub(crate) fn unsettled(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
+        DataError::Unsettled { place, problem: problem.into(), help: help.into() }
     }
 
     pub(crate) fn io(file: &Arc<str>, action: &'static str, source: std::io::Error) -> Self {

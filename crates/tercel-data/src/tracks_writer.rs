@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use crate::error::DataError;
 use crate::export::{MapFormat, MapWriter};
-use crate::format::{Format, SheetWriter, file_name};
+use crate::format::{Format, SheetWriter};
 use crate::layout::{Layout, TrackColumns};
 use crate::output::AtomicFile;
 use crate::sheet::Sheet;
+use crate::source::file_name;
 use crate::table::{Track, Tracks};
 
 /// Writes tracks as they are made: a table, or a map ([`MapFormat`]), which gathers them until the end.

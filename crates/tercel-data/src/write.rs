@@ -5,10 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::DataError;
-use crate::format::{Format, SheetWriter, file_name};
+use crate::format::{Format, SheetWriter};
 use crate::layout::Layout;
 use crate::output::AtomicFile;
 use crate::sheet::Sheet;
+use crate::source::file_name;
 use crate::table::{Detections, Metrics, Tracks, Truths};
 use crate::tracks_writer::TracksWriter;
 

@@ -10,8 +10,8 @@ use std::path::Path as FilePath;
 use std::sync::Arc;
 
 use crate::error::DataError;
-use crate::format::file_name;
 use crate::output::AtomicFile;
+use crate::source::file_name;
 use crate::table::{Track, Tracks};
 
 use self::clock::Clock;

@@ -20,12 +20,13 @@ use parquet::schema::types::ColumnPath;
 
 use super::guard::guarded;
 use super::{Content, Plan, read_error};
-use crate::column::{Column, Kind};
+use crate::column::{self, Column};
 use crate::error::{DataError, Place, Refusal, Spot};
 use crate::layout::Layout;
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
 use crate::sheet::{Sheet, Values};
+use crate::source::Kind;
 
 /// Key of the description in the metadata of a file.
 const KEY: &str = "tercel";
@@ -39,7 +40,16 @@ pub(crate) fn read<T: Layout>(
     let mut bytes = Vec::new();
     reader.read_to_end(&mut bytes).map_err(|error| read_error(file, error))?;
     if !bytes.starts_with(b"PAR1") {
-        return Err(corrupt(file, "it does not begin like a Parquet file"));
+        let (what, help) = match Kind::of(&bytes) {
+            Kind::Other(what) => (what, "give a Parquet file, or save the table as CSV with a header"),
+            Kind::Json => ("JSON", "name the format: --from ndjson"),
+            Kind::Text | Kind::Parquet => ("text", "name the format: --from csv"),
+        };
+        return Err(DataError::unsettled(
+            Place::whole(file),
+            format!("this is no Parquet file but {what}"),
+            help,
+        ));
     }
     // The decoder checks most of what it reads, but not all: about one damaged file in 400 makes it panic.
     guarded(|| decode::<T>(bytes.into(), file, options))
@@ -103,7 +113,7 @@ fn append(
     let refused = |row: usize| move |refusal: Refusal| refusal.at(at(row), &column.name);
     match (column.kind, cells.data_type()) {
         (
-            Kind::Text,
+            column::Kind::Text,
             DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View | DataType::Dictionary(..),
         ) => {
             let texts = to(&DataType::Utf8)?;
@@ -111,7 +121,7 @@ fn append(
                 values.push_text(text.unwrap_or_default(), column, options.angles).map_err(refused(row))?;
             }
         }
-        (Kind::Time, DataType::Timestamp(..)) => {
+        (column::Kind::Time, DataType::Timestamp(..)) => {
             let nanoseconds = to(&DataType::Timestamp(TimeUnit::Nanosecond, None))?;
             let nanoseconds = cast(&nanoseconds, &DataType::Int64).map_err(|_| wrong_type())?;
             for (row, time) in nanoseconds.as_primitive::<Int64Type>().iter().enumerate() {
@@ -122,7 +132,7 @@ fn append(
                 pushed.map_err(refused(row))?;
             }
         }
-        (Kind::Count, integer) if integer.is_integer() => {
+        (column::Kind::Count, integer) if integer.is_integer() => {
             let counts = to(&DataType::UInt64)?;
             for (row, count) in counts.as_primitive::<UInt64Type>().iter().enumerate() {
                 let pushed = match count {
@@ -133,7 +143,7 @@ fn append(
                 pushed.map_err(refused(row))?;
             }
         }
-        (Kind::Count | Kind::Time | Kind::Real(_), number) if number.is_numeric() => {
+        (column::Kind::Count | column::Kind::Time | column::Kind::Real(_), number) if number.is_numeric() => {
             let numbers = to(&DataType::Float64)?;
             for (row, number) in numbers.as_primitive::<Float64Type>().iter().enumerate() {
                 let pushed = match number {
@@ -180,7 +190,7 @@ impl<W: Write + Send> Writer<W> {
             .collect();
         let schema = Arc::new(Schema::new(fields));
         // Measured and estimated numbers hardly repeat: a dictionary of them costs time and saves nothing.
-        let plain = columns.iter().filter(|column| matches!(column.kind, Kind::Real(_)));
+        let plain = columns.iter().filter(|column| matches!(column.kind, column::Kind::Real(_)));
         let properties = plain
             .map(|column| ColumnPath::new(vec![column.name.to_string()]))
             .fold(WriterProperties::builder(), |builder, path| {
@@ -208,11 +218,11 @@ impl<W: Write + Send> Writer<W> {
     }
 }
 
-fn data_type(kind: Kind) -> DataType {
+fn data_type(kind: column::Kind) -> DataType {
     match kind {
-        Kind::Text => DataType::Utf8,
-        Kind::Count => DataType::UInt64,
-        Kind::Time | Kind::Real(_) => DataType::Float64,
+        column::Kind::Text => DataType::Utf8,
+        column::Kind::Count => DataType::UInt64,
+        column::Kind::Time | column::Kind::Real(_) => DataType::Float64,
     }
 }
 

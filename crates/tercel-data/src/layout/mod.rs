@@ -14,7 +14,9 @@ use crate::error::{DataError, Place};
 use crate::format::{Content, json};
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
+use crate::remarks::Remarks;
 use crate::sheet::{Cells, Sheet};
+use crate::source::text;
 
 pub(crate) use detections::{DetectionRow, Rows, detection_columns};
 pub(crate) use header::{match_header, near_miss};
@@ -49,8 +51,11 @@ pub(crate) trait Layout: Sized {
         reader: &mut dyn BufRead,
         file: &Arc<str>,
         options: &ReadOptions,
+        remarks: &mut Remarks,
     ) -> Result<Self, DataError> {
-        let Content { sheet, metadata, found } = json::read::<Self>(reader, file, options)?;
+        let mut text = text(reader, file)?;
+        let Content { sheet, metadata, found } = json::read::<Self>(text.reader.as_mut(), file, options)?;
+        remarks.notes.extend(text.note());
         Self::from_sheet(&sheet, metadata, &Context { file, options, found: &found })
     }
 

@@ -129,9 +129,9 @@ impl TrackArguments {
         // What aircraft and ships say of themselves is the detections here; it cannot be their truth as well.
         let truths = source == Source::Autoferry && self.truth.is_none();
         let options = ImportOptions { truths, ..ImportOptions::default() };
-        let Imported { detections, truths, left_out } =
-            self.read.import(source, std::slice::from_ref(&self.input), options, console)?;
-        note_left_out(&Imported { left_out, ..Imported::default() }, console);
+        let imported = self.read.import(source, std::slice::from_ref(&self.input), options, console)?;
+        note_left_out(&imported, console);
+        let Imported { detections, truths, .. } = imported;
         let truths = self.truths(truths)?;
         let target = self.target();
         if target.is_none() {
