@@ -15,7 +15,7 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
-    /// Print no notes, warnings or progress on standard error; errors are still printed.
+    /// Print no notes, warnings or progress on standard error: only errors and, in one line, what was left out.
     #[arg(long, short, global = true, help_heading = "Global options")]
     pub quiet: bool,
     /// When to use colours. The environment variable NO_COLOR is respected.

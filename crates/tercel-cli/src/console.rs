@@ -88,6 +88,13 @@ impl Console {
         self.say("warning", "33", message);
     }
 
+    /// Says in a line what those must know who asked for no notes; others have it from the notes and the summary.
+    pub fn brief(&self, message: impl Display) {
+        if self.quiet {
+            eprintln!("{message}");
+        }
+    }
+
     /// Prints text as it is.
     pub fn text(&self, text: &str) {
         if !self.quiet {

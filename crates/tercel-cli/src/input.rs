@@ -26,6 +26,9 @@ pub struct ReadArguments {
     /// Unit of bearings in a detection table.
     #[arg(long, value_enum, default_value_t, value_name = "UNIT")]
     pub angles: AngleUnit,
+    /// Names of the columns of a CSV file that has no header, in their order: time,x,y.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub columns: Option<Vec<String>>,
     /// Name of the sensor, for a detection table that does not name one.
     #[arg(long, value_name = "NAME")]
     pub sensor: Option<String>,
@@ -53,7 +56,7 @@ impl ReadArguments {
             AngleUnit::Degrees => Angles::Degrees,
             AngleUnit::Radians => Angles::Radians,
         };
-        ReadOptions { angles, sensor: self.sensor.as_deref().map(Into::into) }
+        ReadOptions { angles, sensor: self.sensor.as_deref().map(Into::into), columns: self.columns.clone() }
     }
 
     /// The source of a file: the one that was named, or the one that it looks like.
@@ -104,6 +107,9 @@ pub fn is_stdin(path: &Path) -> bool {
 
 /// Says how many rows of a recording are not in the tables, and why.
 pub fn note_left_out(imported: &Imported, console: &Console) {
+    for note in &imported.notes {
+        console.note(note);
+    }
     for left_out in &imported.left_out {
         console.note(format_args!("left out {}: {}", counted(left_out.rows as u64, "row"), left_out.reason));
     }

@@ -3,11 +3,13 @@
 //! Exit codes: 0 for success, 1 for a failure of the system or of the program, 2 for bad usage, 3 for bad input (a file,
 //! a table or a configuration that cannot be used).
 
+mod account;
 mod arguments;
 mod command;
 mod console;
 mod failure;
 mod input;
+mod origin;
 mod output;
 mod progress;
 mod score;

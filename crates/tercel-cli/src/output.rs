@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use tercel_data::{AtomicFile, Format};
+use tercel_data::{AtomicFile, Format, MapFormat};
 
 use crate::failure::Failure;
 
@@ -31,6 +31,24 @@ impl Target {
                 Err("the name must end in .csv, .parquet or .ndjson, or be - for standard output".to_owned())
             }
         }
+    }
+
+    /// Reads an argument for tracks, which may go to a map as well.
+    pub fn parse_tracks(text: &str) -> Result<Target, String> {
+        match (MapFormat::of(Path::new(text)), Target::parse(text)) {
+            (Some(_), _) => Ok(Target::File(PathBuf::from(text))),
+            (None, Err(_)) => {
+                Err("the name must end in .csv, .parquet, .ndjson, .geojson, .kml or .gpx, or be - \
+                                   for standard output"
+                    .to_owned())
+            }
+            (None, table) => table,
+        }
+    }
+
+    /// True when it is a map.
+    pub fn is_map(&self) -> bool {
+        self.file().is_some_and(|path| MapFormat::of(path).is_some())
     }
 
     /// The path, if it is a file.

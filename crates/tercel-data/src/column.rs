@@ -14,6 +14,19 @@ pub(crate) struct Column {
     pub unit: Cow<'static, str>,
     /// Every row has a value, and so every file has the column.
     pub needed: bool,
+    /// How its numbers are written where people read them.
+    pub written: Written,
+}
+
+/// How the numbers of a column are written in CSV. The other formats keep every bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Written {
+    /// So that reading gives the same bits.
+    Exactly,
+    /// With so many digits from the first that is not zero, and at least so many decimals.
+    Digits { digits: usize, decimals: usize },
+    /// With so many decimals.
+    Decimals(usize),
 }
 
 /// What the cells of a column are.
@@ -56,7 +69,13 @@ pub enum Angles {
 
 impl Column {
     const fn new(name: &'static str, kind: Kind, unit: &'static str) -> Self {
-        Column { name: Cow::Borrowed(name), kind, unit: Cow::Borrowed(unit), needed: false }
+        Column {
+            name: Cow::Borrowed(name),
+            kind,
+            unit: Cow::Borrowed(unit),
+            needed: false,
+            written: Written::Exactly,
+        }
     }
 
     pub const fn text(name: &'static str) -> Self {
@@ -78,6 +97,11 @@ impl Column {
     /// A finite number whose name or unit is known at run time only.
     pub fn named(name: String, unit: String) -> Self {
         Column { name: Cow::Owned(name), unit: Cow::Owned(unit), ..Column::real("", "", Limits::Finite) }
+    }
+
+    pub const fn written(mut self, written: Written) -> Self {
+        self.written = written;
+        self
     }
 
     pub const fn needed(mut self) -> Self {
@@ -105,7 +129,7 @@ impl Column {
         let Kind::Real(limits) = self.kind else {
             return Limits::Finite.check(value);
         };
-        if self.unit_in(angles) != "deg" {
+        if angles == Angles::Radians || self.unit != "rad" {
             return limits.check(value);
         }
         let angle = Limits::Finite.check(value)?.to_radians();

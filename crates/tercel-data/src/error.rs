@@ -65,6 +65,16 @@ pub enum DataError {
         /// What to do.
         help: &'static str,
     },
+    /// What is there cannot be used as it is, but an option or another program settles it.
+    #[error("{place}: {problem}")]
+    Unsettled {
+        /// Where.
+        place: Place,
+        /// What stands in the way.
+        problem: String,
+        /// What to do.
+        help: String,
+    },
     /// The name of a file does not tell its format.
     #[error("{file}: the name does not tell the format; known are {known}")]
     UnknownFormat {
@@ -121,6 +131,12 @@ pub enum DataError {
         /// What to do.
         help: String,
     },
+    /// Tracks cannot be drawn on a map, because nothing says where on the Earth their local frame lies.
+    #[error("{file}: a map needs latitude and longitude, and the tracks have only `x` and `y`")]
+    NoOrigin {
+        /// The file that was to be written.
+        file: Arc<str>,
+    },
     /// One cell of the table is not what its column holds.
     #[error("{place}: column `{column}` is {value}; expected {expected}")]
     Value {
@@ -153,11 +169,15 @@ impl DataError {
         match self {
             DataError::Io { .. } => None,
             DataError::Empty { .. } => Some("check that the program that wrote it came to its end"),
+            DataError::NoOrigin { .. } => {
+                Some("say where on the Earth x = 0, y = 0 is: --origin LAT,LON; or write a table: .csv, .parquet, .ndjson")
+            }
             DataError::UnknownFormat { .. } => Some("rename the file, or name the format: --from csv"),
             DataError::Corrupt { help, .. } | DataError::Row { help, .. } => Some(*help),
             DataError::MissingColumns { help, .. }
             | DataError::Column { help, .. }
             | DataError::Unit { help, .. }
+            | DataError::Unsettled { help, .. }
             | DataError::Metadata { help, .. } => Some(help.as_str()),
             DataError::Value { help, .. } => help.as_deref(),
         }
@@ -167,6 +187,10 @@ impl DataError {
     /// True when the operating system refused, as opposed to content that is wrong.
     pub fn is_io(&self) -> bool {
         matches!(self, DataError::Io { .. })
+    }
+
+    pub(crate) fn unsettled(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
+        DataError::Unsettled { place, problem: problem.into(), help: help.into() }
     }
 
     pub(crate) fn io(file: &Arc<str>, action: &'static str, source: std::io::Error) -> Self {

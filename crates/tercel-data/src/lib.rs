@@ -24,7 +24,9 @@
 //! Writers put a file in its place only when it is complete ([`AtomicFile`]).
 
 mod column;
+mod earth;
 mod error;
+mod export;
 mod format;
 pub mod import;
 mod layout;
@@ -34,12 +36,16 @@ mod npy;
 mod options;
 mod output;
 mod read;
+mod remarks;
 mod sheet;
+mod source;
 pub mod table;
+mod tracks_writer;
 mod write;
 
 pub use column::Angles;
 pub use error::{DataError, Place, Spot};
+pub use export::MapFormat;
 pub use format::Format;
 pub use import::{ImportOptions, Imported, LeftOut, Source, import};
 pub use metadata::SCHEMA_VERSION;
@@ -50,7 +56,8 @@ pub use read::{
     read_detections, read_detections_from, read_metrics, read_metrics_from, read_tracks, read_tracks_from,
     read_truths, read_truths_from,
 };
+pub use tracks_writer::TracksWriter;
 pub use write::{
-    TracksWriter, write_detections, write_detections_to, write_metrics, write_metrics_to, write_tracks,
-    write_tracks_to, write_truths, write_truths_to,
+    write_detections, write_detections_to, write_metrics, write_metrics_to, write_tracks, write_tracks_to,
+    write_truths, write_truths_to,
 };

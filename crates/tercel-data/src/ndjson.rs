@@ -33,9 +33,7 @@ use serde_json::{Map, Value};
 
 use crate::error::{DataError, Place};
 use crate::format::json::{Lines, description, push_with, write_row};
-use crate::layout::{
-    Context, DetectionRow, Layout, Rows, detection_columns, fill_tracks, near_miss, track_columns,
-};
+use crate::layout::{Context, DetectionRow, Layout, Rows, TrackColumns, detection_columns, near_miss};
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
 use crate::sheet::Sheet;
@@ -289,6 +287,7 @@ impl<R: BufRead> Iterator for Scans<R> {
 ///     covariance: vec![4.0, 0.0, 4.0],
 ///     modes: vec![],
 ///     extent: None,
+///     altitude: None,
 ///     identity: None,
 ///     detection: None,
 /// };
@@ -308,8 +307,9 @@ pub fn write_track(
     modes: &[String],
 ) -> Result<(), DataError> {
     let file: Arc<str> = "the stream of tracks".into();
-    let mut sheet = Sheet::new(track_columns(labels, modes));
-    fill_tracks(&mut sheet, std::slice::from_ref(track), labels, modes, &file)?;
+    let columns = TrackColumns::new(None, labels, modes);
+    let mut sheet = Sheet::new(columns.written());
+    columns.fill(&mut sheet, std::slice::from_ref(track), &file)?;
     if let Some((_, column, refusal)) = sheet.first_refused() {
         return Err(refusal.at(Place::whole(&file), &column.name));
     }

@@ -18,6 +18,8 @@ pub struct ReadOptions {
     pub angles: Angles,
     /// Name of the sensor where the file does not name one.
     pub sensor: Option<Arc<str>>,
+    /// Names of the columns of a CSV file without header, in their order.
+    pub columns: Option<Vec<String>>,
 }
 
 impl ReadOptions {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use tempfile::NamedTempFile;
 
 use crate::error::DataError;
-use crate::format::file_name;
+use crate::source::file_name;
 
 /// A file that is written beside its target and takes its place when it is complete.
 ///

@@ -5,21 +5,26 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::DataError;
-use crate::format::{Format, decompressed, open, read_table};
+use crate::format::{Format, read_table};
+use crate::import::Imported;
 use crate::layout::Layout;
 use crate::options::ReadOptions;
+use crate::remarks::Remarks;
+use crate::source::{decompressed, open};
 use crate::table::{Detections, Metrics, Tracks, Truths};
 
 fn from_path<T: Layout>(path: &Path, options: &ReadOptions) -> Result<T, DataError> {
-    let format = Format::of(path)?;
+    let format = Format::of_input(path).map_or_else(|| Format::of(path), Ok)?;
     let (file, mut reader) = open(path)?;
-    read_table(reader.as_mut(), format, &file, options)
+    read_table(reader.as_mut(), format, &file, options, &mut Remarks::default())
 }
 
 /// Reads detections in a format that was chosen by hand.
-pub(crate) fn read_as(path: &Path, format: Format, options: &ReadOptions) -> Result<Detections, DataError> {
+pub(crate) fn read_as(path: &Path, format: Format, options: &ReadOptions) -> Result<Imported, DataError> {
     let (file, mut reader) = open(path)?;
-    read_table(reader.as_mut(), format, &file, options)
+    let mut remarks = Remarks::default();
+    let detections = read_table(reader.as_mut(), format, &file, options, &mut remarks)?;
+    Ok(Imported { detections, notes: remarks.notes, left_out: remarks.left_out, truths: None })
 }
 
 fn from_stream<T: Layout>(
@@ -30,7 +35,7 @@ fn from_stream<T: Layout>(
 ) -> Result<T, DataError> {
     let file: Arc<str> = name.into();
     let mut reader = decompressed(reader, &file)?;
-    read_table(reader.as_mut(), format, &file, options)
+    read_table(reader.as_mut(), format, &file, options, &mut Remarks::default())
 }
 
 /// Reads detections from a CSV, Parquet or NDJSON file, compressed by gzip or not.

@@ -86,7 +86,7 @@ fn repeated_positions_are_left_out_and_counted() {
     for (text, kept) in [(fresh, 2), (updates, 3), (places, 3)] {
         let imported = aircraft(text, &options());
         assert_eq!(truths(&imported).len(), kept, "{text}");
-        assert_eq!(imported.left_out, [LeftOut { reason: "a repeated position", rows: 1 }]);
+        assert_eq!(imported.left_out, [LeftOut { reason: "a repeated position".into(), rows: 1 }]);
         let all = aircraft(text, &ImportOptions { keep_repeated: true, ..options() });
         assert_eq!(truths(&all).len(), kept + 1);
     }
@@ -106,7 +106,7 @@ fn reports_take_the_time_of_their_position() {
 fn rows_without_a_position_are_left_out_and_counted() {
     let text = "time,icao24,lat,lon\n0,a,50,1\n1,a,,\n2,a,NaN,nan\n";
     let imported = aircraft(text, &options());
-    assert_eq!(imported.left_out, [LeftOut { reason: "without a time or position", rows: 2 }]);
+    assert_eq!(imported.left_out, [LeftOut { reason: "without a time or position".into(), rows: 2 }]);
 }
 
 #[test]
@@ -172,8 +172,8 @@ fn what_ships_do_not_know_is_nothing() {
     assert_eq!(
         imported.left_out,
         [
-            LeftOut { reason: "without a time or position", rows: 1 },
-            LeftOut { reason: "a repeated report", rows: 1 }
+            LeftOut { reason: "without a time or position".into(), rows: 1 },
+            LeftOut { reason: "a repeated report".into(), rows: 1 }
         ]
     );
 }

@@ -1,4 +1,4 @@
-//! What is written is read back to the last bit, in every format.
+//! What is written is read back: to the last bit, but for the estimates of tracks in CSV, which are rounded.
 
 // The exception for tests covers only the test functions themselves, not their helpers.
 #![allow(clippy::unwrap_used, clippy::panic)]
@@ -17,6 +17,58 @@ const FORMATS: [Format; 3] = [Format::Csv, Format::Parquet, Format::Ndjson];
 /// `assert_eq!` holds zeros of either sign for equal; their text does not.
 fn same<T: PartialEq + std::fmt::Debug>(a: &T, b: &T) -> bool {
     a == b && format!("{a:?}") == format!("{b:?}")
+}
+
+/// Half of the last of seven digits, with room for the last bit of a double.
+const DIGITS: f64 = 0.5e-6 * (1.0 + 1e-9);
+/// Half of the last of seven decimals.
+const SHARE: f64 = 0.5e-7 * (1.0 + 1e-9);
+/// Half of a tenth of a millimetre.
+const LENGTH: f64 = 0.5e-4 * (1.0 + 1e-9);
+
+/// The numbers of a row that CSV rounds, with how far each may be off.
+fn rounded<'a>(row: &'a mut Track, labels: &'a [String]) -> Vec<(&'a mut f64, f64)> {
+    let relative = |number: &mut f64| number.abs() * DIGITS;
+    let length = |number: &mut f64| (number.abs() * DIGITS).min(LENGTH).max(number.abs() * f64::EPSILON);
+    let mut numbers = vec![(&mut row.existence, SHARE)];
+    numbers.extend(row.modes.iter_mut().map(|mode| (mode, SHARE)));
+    numbers.extend(row.covariance.iter_mut().map(|number| {
+        let off = relative(number);
+        (number, off)
+    }));
+    numbers.extend(row.state.iter_mut().zip(labels).map(|(number, label)| {
+        let off = if matches!(label.as_str(), "x" | "y") { length(number) } else { relative(number) };
+        (number, off)
+    }));
+    numbers.extend(row.extent.iter_mut().flatten().chain(&mut row.altitude).map(|number| {
+        let off = length(number);
+        (number, off)
+    }));
+    numbers
+}
+
+/// True when the tables differ by no more than what CSV rounds.
+fn nearly_same(back: &Tracks, table: &Tracks) -> bool {
+    let (mut back, mut table) = (back.clone(), table.clone());
+    let labels = table.labels.clone();
+    for (back, row) in back.rows.iter_mut().zip(&mut table.rows) {
+        let (back, row) = (rounded(back, &labels), rounded(row, &labels));
+        if back.len() != row.len() {
+            return false;
+        }
+        for ((back, _), (number, off)) in back.into_iter().zip(row) {
+            if (*back - *number).abs() > off {
+                return false;
+            }
+            (*back, *number) = (0.0, 0.0);
+        }
+    }
+    same(&back, &table)
+}
+
+/// What a format promises for tracks.
+fn kept(format: Format, back: &Tracks, table: &Tracks) -> bool {
+    if format == Format::Csv { nearly_same(back, table) } else { same(back, table) }
 }
 
 macro_rules! round_trip {
@@ -51,7 +103,9 @@ proptest! {
     fn tracks_survive_every_format(table in common::tracks()) {
         for format in FORMATS {
             let back: Tracks = round_trip!(&table, format, write_tracks_to, read_tracks_from);
-            prop_assert!(same(&back, &table), "{format:?}: {back:?}");
+            prop_assert!(kept(format, &back, &table), "{format:?}: {back:?}");
+            let again: Tracks = round_trip!(&back, format, write_tracks_to, read_tracks_from);
+            prop_assert!(same(&again, &back), "what is rounded once stays the same: {format:?}: {again:?}");
         }
     }
 
@@ -74,7 +128,7 @@ proptest! {
             }
             writer.finish().unwrap();
             let back = read_tracks_from(bytes.as_slice(), format, "tracks", &ReadOptions::default()).unwrap();
-            prop_assert!(same(&back, &table), "{format:?}: {back:?}");
+            prop_assert!(kept(format, &back, &table), "{format:?}: {back:?}");
         }
     }
 }
@@ -94,6 +148,7 @@ fn csv_and_parquet_have_the_same_columns() {
             covariance: vec![0.0; 10],
             modes: vec![1.0],
             extent: None,
+            altitude: None,
             identity: None,
             detection: None,
         }],

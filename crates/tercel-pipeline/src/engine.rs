@@ -228,6 +228,7 @@ fn row<B: Clone, const N: usize>(
         covariance: upper.map(|index| estimate.covariance[index]).collect(),
         modes: estimate.modes,
         extent: None,
+        altitude: None,
         identity: filter.called(&track.belief).and_then(|identity| names.name(identity)).cloned(),
         detection: track.measurement.map(|number| scan.detections[number].id),
     })

@@ -5,11 +5,16 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tercel_data::table::{Origin, Truths};
-use tercel_data::{AtomicFile, Format, ImportOptions, Imported, write_detections_to, write_truths_to};
+use tercel_data::{
+    AtomicFile, DataError, Format, ImportOptions, Imported, ReadOptions, TracksWriter, read_tracks,
+    write_detections_to, write_truths_to,
+};
 
+use crate::account::Account;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::input::{ReadArguments, is_stdin, note_left_out};
+use crate::origin;
 use crate::output::{STDOUT, Target, keep_inputs};
 use crate::summary::counted;
 
@@ -18,14 +23,17 @@ use crate::summary::counted;
 /// Writes the table of detections and, with --truth-out, what the recording knows of the truth: the file beside an Autoferry
 /// recording, the positions that aircraft and ships broadcast of themselves. Several files of one kind become one table in
 /// the order of time.
+///
+/// With the name of a map as output, the input is a table of tracks.
 #[derive(Debug, Args)]
 #[command(after_long_help = AFTER)]
 pub struct ConvertArguments {
     /// The recording; - is standard input (tables only). Several files of one kind are joined.
     #[arg(required = true)]
     input: Vec<PathBuf>,
-    /// Table of detections to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON).
-    #[arg(long, short, value_name = "FILE", default_value = "-", value_parser = Target::parse)]
+    /// Table of detections to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON), or map of tracks (.geojson,
+    /// .kml, .gpx).
+    #[arg(long, short, value_name = "FILE", default_value = "-", value_parser = Target::parse_tracks)]
     output: Target,
     /// Table of the truth to write (.csv, .parquet, .ndjson).
     #[arg(long, value_name = "FILE", value_parser = Target::parse)]
@@ -33,7 +41,7 @@ pub struct ConvertArguments {
     #[command(flatten)]
     read: ReadArguments,
     /// Origin of the local frame for geographic recordings, degrees and m; without it, the median position.
-    #[arg(long, value_name = "LAT,LON[,ALT]", value_parser = origin, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LAT,LON[,ALT]", value_parser = origin::parse, allow_hyphen_values = true)]
     origin: Option<Origin>,
     /// Keep reports that repeat a position (adsb, ais).
     #[arg(long)]
@@ -50,12 +58,18 @@ const AFTER: &str = "\
 Examples:
   tercel convert scenario2_detections.json.gz -o radar.parquet --truth-out truth.parquet
   tercel convert --from adsb states.csv --origin 47.46,8.55,432 -o aircraft.csv
-  tercel convert radar.csv --angles degrees | tercel track -";
+  tercel convert radar.csv --angles degrees | tercel track -
+  tercel convert tracks.parquet -o tracks.geojson";
 
 impl ConvertArguments {
     /// Reads the recording and writes its tables.
     pub fn run(&self, console: &Console) -> Result<(), Failure> {
         self.check()?;
+        if let Target::File(path) = &self.output
+            && self.output.is_map()
+        {
+            return self.draw(path, console);
+        }
         let source = self.read.source(&self.input[0])?;
         let options = ImportOptions {
             origin: self.origin,
@@ -65,8 +79,10 @@ impl ConvertArguments {
             split_callsigns: self.split_callsigns,
             ..ImportOptions::default()
         };
-        let imported = self.read.import(source, &self.input, options, console)?;
+        let mut imported = self.read.import(source, &self.input, options, console)?;
         note_left_out(&imported, console);
+        Account::of(imported.left_out.clone()).say_briefly(console);
+        imported.detections.origin = origin::settle(imported.detections.origin, self.origin)?;
         let written = self.write(&imported)?;
         let scans = imported.detections.scans.len() as u64;
         let detections: usize = imported.detections.scans.iter().map(|scan| scan.detections.len()).sum();
@@ -81,6 +97,29 @@ impl ConvertArguments {
             console.note(format_args!("the recording has a truth of {rows}; --truth-out FILE writes it"));
         }
         Ok(())
+    }
+
+    /// Puts tracks on a map.
+    fn draw(&self, path: &Path, console: &Console) -> Result<(), Failure> {
+        let [input] = &self.input[..] else {
+            return Err(Failure::usage("a map is made of one table of tracks"));
+        };
+        if self.truth_out.is_some() || is_stdin(input) {
+            return Err(Failure::usage("a map is made of a file of tracks, which has no truth"));
+        }
+        let mut tracks = read_tracks(input, &ReadOptions::default()).map_err(|error| {
+            let is_no_table = matches!(error, DataError::Metadata { .. } | DataError::MissingColumns { .. });
+            let failure = Failure::from(error);
+            if !is_no_table {
+                return failure;
+            }
+            failure
+                .with_help("a map is made of tracks; `tercel track INPUT -o FILE` tracks and draws at once")
+        })?;
+        tracks.origin = origin::settle(tracks.origin, self.origin)?;
+        let writer = TracksWriter::create(path, &tracks)?;
+        writer.notes().iter().for_each(|note| console.note(note));
+        Ok(writer.finish()?)
     }
 
     fn check(&self) -> Result<(), Failure> {
@@ -129,42 +168,4 @@ fn truth_file(path: &Path, truths: Option<&Truths>) -> Result<AtomicFile, Failur
     let mut file = AtomicFile::create(path)?;
     write_truths_to(&mut file, Format::of(path)?, &path.to_string_lossy(), truths)?;
     Ok(file)
-}
-
-fn origin(text: &str) -> Result<Origin, String> {
-    let wrong =
-        || "expected degrees north and east, and possibly m above the ellipsoid: 47.46,8.55,432".to_owned();
-    let numbers: Vec<f64> =
-        text.split(',').map(|part| part.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
-    let (latitude, longitude, altitude) = match numbers[..] {
-        [latitude, longitude] => (latitude, longitude, 0.0),
-        [latitude, longitude, altitude] => (latitude, longitude, altitude),
-        _ => return Err(wrong()),
-    };
-    if !(latitude.abs() <= 90.0 && longitude.abs() <= 180.0 && altitude.is_finite()) {
-        return Err(wrong());
-    }
-    Ok(Origin { latitude: latitude.to_radians(), longitude: longitude.to_radians(), altitude })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::origin;
-
-    #[test]
-    fn an_origin_is_degrees_and_metres() {
-        let place = origin("47.5, 8.25,432").unwrap();
-        assert_eq!(
-            (place.latitude, place.longitude, place.altitude),
-            (47.5_f64.to_radians(), 8.25_f64.to_radians(), 432.0)
-        );
-        assert_eq!(origin("-33.9,18.4").unwrap().altitude, 0.0);
-    }
-
-    #[test]
-    fn an_origin_beyond_the_earth_is_refused() {
-        for text in ["91,0", "0,181", "NaN,0", "1", "1,2,3,4", "1,2,inf", "north,east"] {
-            assert!(origin(text).is_err(), "{text}");
-        }
-    }
 }

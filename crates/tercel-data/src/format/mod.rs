@@ -4,20 +4,22 @@ pub(crate) mod csv;
 mod guard;
 pub(crate) mod json;
 pub(crate) mod parquet;
+mod rounded;
 
 use std::collections::HashSet;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, Write};
 use std::path::Path;
 use std::sync::Arc;
-
-use flate2::bufread::MultiGzDecoder;
 
 use crate::column::Column;
 use crate::error::{DataError, Place};
 use crate::layout::{Context, Layout, match_header};
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
+use crate::remarks::Remarks;
 use crate::sheet::Sheet;
+
+pub(crate) use crate::source::{decompressed, file_name, open, read_error};
 
 /// A format in which every table can be read and written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -33,6 +35,21 @@ pub enum Format {
 const KNOWN: &str = ".csv, .parquet and .ndjson (and .csv.gz and .ndjson.gz when reading)";
 
 impl Format {
+    /// The format of a file that is read, as far as its name tells: endings of compressed files are looked past, and text
+    /// tables have other endings, too.
+    pub(crate) fn of_input(path: &Path) -> Option<Format> {
+        let name = path.file_name()?.to_string_lossy().to_lowercase();
+        let bare =
+            [".gz", ".zst", ".zstd", ".xz", ".zip"].iter().find_map(|ending| name.strip_suffix(ending));
+        let name = bare.unwrap_or(&name);
+        match name.rsplit_once('.')?.1 {
+            "csv" | "tsv" | "tab" | "txt" | "dat" | "psv" => Some(Format::Csv),
+            "parquet" | "pq" => Some(Format::Parquet),
+            "ndjson" | "jsonl" => Some(Format::Ndjson),
+            _ => None,
+        }
+    }
+
     /// The format that the name of a file tells: `.csv`, `.parquet`, `.ndjson` or `.jsonl`. An ending `.gz` is
     /// looked past.
     ///
@@ -62,47 +79,6 @@ impl Format {
     }
 }
 
-/// The name of a file in messages: as it was given.
-pub(crate) fn file_name(path: &Path) -> Arc<str> {
-    path.to_string_lossy().into()
-}
-
-/// A stream that is decompressed if it begins like a gzip file.
-pub(crate) fn decompressed<'a>(
-    reader: impl Read + 'a,
-    file: &Arc<str>,
-) -> Result<Box<dyn BufRead + 'a>, DataError> {
-    const GZIP: [u8; 2] = [0x1f, 0x8b];
-    let mut reader = BufReader::with_capacity(1 << 16, reader);
-    let start = reader.fill_buf().map_err(|error| DataError::io(file, "read", error))?;
-    // A stream that hands out a single byte first is not looked at twice: no text table begins with 0x1f.
-    if start.starts_with(&GZIP) || start == &GZIP[..1] {
-        return Ok(Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(reader))));
-    }
-    Ok(Box::new(reader))
-}
-
-/// What went wrong while reading: either the system, or compressed data that is broken.
-pub(crate) fn read_error(file: &Arc<str>, error: std::io::Error) -> DataError {
-    use std::io::ErrorKind;
-    match error.kind() {
-        ErrorKind::UnexpectedEof | ErrorKind::InvalidData | ErrorKind::InvalidInput => DataError::Corrupt {
-            place: Place::whole(file),
-            problem: format!("the compressed data is broken: {error}"),
-            help: "the file may be truncated: copy or download it again",
-        },
-        _ => DataError::io(file, "read", error),
-    }
-}
-
-/// Opens a file, decompressed.
-pub(crate) fn open(path: &Path) -> Result<(Arc<str>, Box<dyn BufRead>), DataError> {
-    let file = file_name(path);
-    let opened = std::fs::File::open(path).map_err(|error| DataError::io(&file, "open", error))?;
-    let reader = decompressed(opened, &file)?;
-    Ok((file, reader))
-}
-
 /// What the beginning of a file says: its description and its columns, with where they stand in the file.
 pub(crate) struct Plan {
     pub metadata: Metadata,
@@ -120,7 +96,7 @@ impl Plan {
         let columns = options.relaxed(T::columns(&metadata));
         no_repetition(&columns, file)?;
         metadata.check_units(&columns, options.angles, file)?;
-        let columns = match_header(found, columns, file)?;
+        let columns = match_header(found, columns, &T::written(&metadata), file)?;
         Ok(Plan { metadata, columns })
     }
 
@@ -157,14 +133,15 @@ pub(crate) fn read_table<T: Layout>(
     format: Format,
     file: &Arc<str>,
     options: &ReadOptions,
+    remarks: &mut Remarks,
 ) -> Result<T, DataError> {
     if reader.fill_buf().map_err(|error| read_error(file, error))?.is_empty() {
         return Err(DataError::Empty { file: Arc::clone(file) });
     }
     let Content { sheet, metadata, found } = match format {
-        Format::Csv => csv::read::<T>(reader, file, options)?,
+        Format::Csv => csv::read::<T>(reader, file, options, remarks)?,
         Format::Parquet => parquet::read::<T>(reader, file, options)?,
-        Format::Ndjson => return T::from_lines(reader, file, options),
+        Format::Ndjson => return T::from_lines(reader, file, options, remarks),
     };
     T::from_sheet(&sheet, metadata, &Context { file, options, found: &found })
 }
@@ -227,6 +204,8 @@ impl<W: Write + Send> SheetWriter<W> {
         }
     }
 }
+
+pub(crate) use rounded::write_rounded;
 
 /// Writes a number so that reading it gives the same bits, and very large and small ones stay short.
 pub(crate) fn write_number(number: f64, text: &mut Vec<u8>) -> std::io::Result<()> {

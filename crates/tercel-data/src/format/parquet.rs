@@ -16,15 +16,17 @@ use parquet::arrow::{ArrowWriter, ProjectionMask};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use parquet::schema::types::ColumnPath;
 
 use super::guard::guarded;
 use super::{Content, Plan, read_error};
-use crate::column::{Column, Kind};
+use crate::column::{self, Column};
 use crate::error::{DataError, Place, Refusal, Spot};
 use crate::layout::Layout;
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
 use crate::sheet::{Sheet, Values};
+use crate::source::Kind;
 
 /// Key of the description in the metadata of a file.
 const KEY: &str = "tercel";
@@ -38,7 +40,16 @@ pub(crate) fn read<T: Layout>(
     let mut bytes = Vec::new();
     reader.read_to_end(&mut bytes).map_err(|error| read_error(file, error))?;
     if !bytes.starts_with(b"PAR1") {
-        return Err(corrupt(file, "it does not begin like a Parquet file"));
+        let (what, help) = match Kind::of(&bytes) {
+            Kind::Other(what) => (what, "give a Parquet file, or save the table as CSV with a header"),
+            Kind::Json => ("JSON", "name the format: --from ndjson"),
+            Kind::Text | Kind::Parquet => ("text", "name the format: --from csv"),
+        };
+        return Err(DataError::unsettled(
+            Place::whole(file),
+            format!("this is no Parquet file but {what}"),
+            help,
+        ));
     }
     // The decoder checks most of what it reads, but not all: about one damaged file in 400 makes it panic.
     guarded(|| decode::<T>(bytes.into(), file, options))
@@ -102,7 +113,7 @@ fn append(
     let refused = |row: usize| move |refusal: Refusal| refusal.at(at(row), &column.name);
     match (column.kind, cells.data_type()) {
         (
-            Kind::Text,
+            column::Kind::Text,
             DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View | DataType::Dictionary(..),
         ) => {
             let texts = to(&DataType::Utf8)?;
@@ -110,7 +121,7 @@ fn append(
                 values.push_text(text.unwrap_or_default(), column, options.angles).map_err(refused(row))?;
             }
         }
-        (Kind::Time, DataType::Timestamp(..)) => {
+        (column::Kind::Time, DataType::Timestamp(..)) => {
             let nanoseconds = to(&DataType::Timestamp(TimeUnit::Nanosecond, None))?;
             let nanoseconds = cast(&nanoseconds, &DataType::Int64).map_err(|_| wrong_type())?;
             for (row, time) in nanoseconds.as_primitive::<Int64Type>().iter().enumerate() {
@@ -121,7 +132,7 @@ fn append(
                 pushed.map_err(refused(row))?;
             }
         }
-        (Kind::Count, integer) if integer.is_integer() => {
+        (column::Kind::Count, integer) if integer.is_integer() => {
             let counts = to(&DataType::UInt64)?;
             for (row, count) in counts.as_primitive::<UInt64Type>().iter().enumerate() {
                 let pushed = match count {
@@ -132,7 +143,7 @@ fn append(
                 pushed.map_err(refused(row))?;
             }
         }
-        (Kind::Count | Kind::Time | Kind::Real(_), number) if number.is_numeric() => {
+        (column::Kind::Count | column::Kind::Time | column::Kind::Real(_), number) if number.is_numeric() => {
             let numbers = to(&DataType::Float64)?;
             for (row, number) in numbers.as_primitive::<Float64Type>().iter().enumerate() {
                 let pushed = match number {
@@ -178,7 +189,13 @@ impl<W: Write + Send> Writer<W> {
             .map(|column| Field::new(column.name.as_ref(), data_type(column.kind), !column.needed))
             .collect();
         let schema = Arc::new(Schema::new(fields));
-        let properties = WriterProperties::builder()
+        // Measured and estimated numbers hardly repeat: a dictionary of them costs time and saves nothing.
+        let plain = columns.iter().filter(|column| matches!(column.kind, column::Kind::Real(_)));
+        let properties = plain
+            .map(|column| ColumnPath::new(vec![column.name.to_string()]))
+            .fold(WriterProperties::builder(), |builder, path| {
+                builder.set_column_dictionary_enabled(path, false)
+            })
             .set_compression(Compression::ZSTD(ZstdLevel::default()))
             .set_created_by(concat!("tercel ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(vec![KeyValue::new(KEY.to_owned(), json)]))
@@ -201,11 +218,11 @@ impl<W: Write + Send> Writer<W> {
     }
 }
 
-fn data_type(kind: Kind) -> DataType {
+fn data_type(kind: column::Kind) -> DataType {
     match kind {
-        Kind::Text => DataType::Utf8,
-        Kind::Count => DataType::UInt64,
-        Kind::Time | Kind::Real(_) => DataType::Float64,
+        column::Kind::Text => DataType::Utf8,
+        column::Kind::Count => DataType::UInt64,
+        column::Kind::Time | column::Kind::Real(_) => DataType::Float64,
     }
 }
 

@@ -107,7 +107,8 @@ fn from_lines(
     }
     let left_out =
         LeftOut::list([("without a time or position", nowhere), ("a repeated position", repeated)]);
-    cooperative::tables(reports, "adsb", left_out, options, file)
+    let imported = cooperative::tables(reports, "adsb", left_out, options, file)?;
+    Ok(Imported { notes: lines.notes(), ..imported })
 }
 
 /// `3c4591/BOX413`.

@@ -87,7 +87,8 @@ fn from_lines(
         reports.push(Report { time, object, latitude, longitude, altitude: None, motion });
     }
     let left_out = LeftOut::list([("without a time or position", nowhere), ("a repeated report", repeated)]);
-    cooperative::tables(reports, "ais", left_out, options, file)
+    let imported = cooperative::tables(reports, "ais", left_out, options, file)?;
+    Ok(Imported { notes: lines.notes(), ..imported })
 }
 
 /// Speed and course, unless they are "not available".

@@ -85,7 +85,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported, DataError>
         }
         None => None,
     };
-    Ok(Imported { detections, truths, left_out: Vec::new() })
+    Ok(Imported { detections, truths, ..Imported::default() })
 }
 
 /// Reads the detections from a stream; `name` stands for it in messages.

@@ -90,6 +90,7 @@ pub(super) fn tables(
         detections: Detections { origin, description, scans },
         truths: options.truths.then_some(Truths { origin, rows: truths }),
         left_out,
+        ..Imported::default()
     })
 }
 

@@ -7,7 +7,7 @@ use jiff::civil::DateTime;
 use jiff::tz::TimeZone;
 
 use crate::error::{DataError, Place, Refusal};
-use crate::format::csv::Rows;
+use crate::format::csv::{Record, Rows};
 use crate::sheet::unix_seconds;
 
 /// Metres in a foot.
@@ -39,16 +39,14 @@ pub(super) struct Reports<'a> {
 
 impl<'a> Reports<'a> {
     pub fn new(reader: &'a mut dyn BufRead, file: &'a Arc<str>) -> Result<Self, DataError> {
-        let start = reader.fill_buf().map_err(|error| crate::format::read_error(file, error))?;
-        if start.is_empty() {
-            return Err(DataError::Empty { file: Arc::clone(file) });
-        }
-        if start.starts_with(b"\xef\xbb\xbf") {
-            reader.consume(3);
-        }
-        let rows = Rows::new(reader, file, 0)?;
-        let plain = rows.header.iter().map(|name| plain(name)).collect();
+        let rows = Rows::new(reader, file, None)?;
+        let plain = rows.named(file)?.iter().map(|name| plain(name)).collect();
         Ok(Reports { rows, plain, file })
+    }
+
+    /// What is worth saying about the text, once all is read.
+    pub fn notes(&self) -> Vec<String> {
+        self.rows.notes()
     }
 
     /// Finds a column by its names.
@@ -91,7 +89,7 @@ impl<'a> Reports<'a> {
 
 /// One line of a file of reports.
 pub(super) struct Report<'a> {
-    record: &'a csv::ByteRecord,
+    record: &'a Record,
     line: u64,
     file: &'a Arc<str>,
 }
@@ -100,8 +98,7 @@ impl Report<'_> {
     /// What a field holds; an empty cell, `null`, `nan` and the like are nothing.
     pub fn text(&self, field: &Field) -> Option<String> {
         let (at, _) = field.column.as_ref()?;
-        let text = String::from_utf8_lossy(self.record.get(*at)?);
-        let text = text.trim();
+        let text = self.record.get(*at)?.trim();
         let nothing =
             ["", "nan", "null", "none", "na", "n/a"].iter().any(|word| text.eq_ignore_ascii_case(word));
         (!nothing).then(|| text.to_owned())

@@ -7,6 +7,7 @@ mod cooperative;
 mod fields;
 mod recognise;
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use crate::error::{DataError, Refusal};
@@ -90,13 +91,15 @@ pub struct Imported {
     pub truths: Option<Truths>,
     /// Rows of the source that are not in the tables, by reason.
     pub left_out: Vec<LeftOut>,
+    /// What was decided while reading and the user should know, in sentences.
+    pub notes: Vec<String>,
 }
 
 /// Rows that were left out for one reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LeftOut {
     /// The reason, as a sentence part: `a repeated position`.
-    pub reason: &'static str,
+    pub reason: Cow<'static, str>,
     /// How many.
     pub rows: usize,
 }
@@ -106,7 +109,7 @@ impl LeftOut {
         reasons
             .into_iter()
             .filter(|(_, rows)| *rows > 0)
-            .map(|(reason, rows)| LeftOut { reason, rows })
+            .map(|(reason, rows)| LeftOut { reason: reason.into(), rows })
             .collect()
     }
 }
@@ -145,9 +148,7 @@ pub fn import<P: AsRef<Path>>(
 }
 
 fn import_one(source: Source, path: &Path, options: &ImportOptions) -> Result<Imported, DataError> {
-    let table = |format| {
-        read_as(path, format, &options.read).map(|detections| Imported { detections, ..Imported::default() })
-    };
+    let table = |format| read_as(path, format, &options.read);
     match source {
         Source::Csv => table(Format::Csv),
         Source::Parquet => table(Format::Parquet),
@@ -167,6 +168,8 @@ fn join(mut whole: Imported, part: Imported, path: &Path) -> Result<Imported, Da
             help: "bring in the files one by one".to_owned(),
         });
     }
+    whole.detections.description =
+        std::mem::take(&mut whole.detections.description).joined(part.detections.description);
     whole.detections.scans.extend(part.detections.scans);
     whole.detections.scans.sort_by(|a, b| a.time.total_cmp(&b.time));
     let detections = whole.detections.scans.iter_mut().flat_map(|scan| &mut scan.detections);
@@ -184,6 +187,7 @@ fn join(mut whole: Imported, part: Imported, path: &Path) -> Result<Imported, Da
             None => whole.left_out.push(LeftOut { reason, rows }),
         }
     }
+    whole.notes.extend(part.notes);
     Ok(whole)
 }
 

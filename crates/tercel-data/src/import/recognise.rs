@@ -22,7 +22,7 @@ impl Source {
             file: file_name(path),
             known: "csv, parquet, ndjson, autoferry, adsb and ais",
         };
-        match Format::of(path) {
+        match Format::of_input(path).ok_or(()) {
             Ok(Format::Parquet) => Ok(Source::Parquet),
             Ok(Format::Ndjson) => Ok(Source::Ndjson),
             Ok(Format::Csv) => {

@@ -11,7 +11,9 @@ use crate::error::{DataError, Place};
 use crate::metadata::Metadata;
 use crate::ndjson::Scans;
 use crate::options::ReadOptions;
+use crate::remarks::Remarks;
 use crate::sheet::{Cells, Sheet};
+use crate::source::text;
 use crate::table::{Detection, Detections, Noise, Observation, Scan};
 
 /// The columns of the table.
@@ -79,8 +81,10 @@ impl Layout for Detections {
         reader: &mut dyn BufRead,
         file: &Arc<str>,
         options: &ReadOptions,
+        remarks: &mut Remarks,
     ) -> Result<Self, DataError> {
-        let mut lines = Scans::new(reader, file, options.clone());
+        let mut text = text(reader, file)?;
+        let mut lines = Scans::new(text.reader.as_mut(), file, options.clone());
         let mut scans = Vec::new();
         let mut ids = HashSet::new();
         for scan in &mut lines {
@@ -90,7 +94,9 @@ impl Layout for Detections {
             }
             scans.push(scan);
         }
-        Ok(Detections { origin: lines.origin(), description: lines.description(), scans })
+        let (origin, description) = (lines.origin(), lines.description());
+        remarks.notes.extend(text.note());
+        Ok(Detections { origin, description, scans })
     }
 
     fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError> {

@@ -9,10 +9,11 @@ use crate::error::{DataError, Place};
 /// For each column that the file has, where it stands there.
 ///
 /// Columns of the file that are not known are left out, unless their name is so near to a missing one that it
-/// looks like a slip of the pen.
+/// looks like a slip of the pen. Those of `written` are no slips: they follow from others and are not read.
 pub(crate) fn match_header(
     found: &[String],
     columns: Vec<Column>,
+    written: &[Column],
     file: &Arc<str>,
 ) -> Result<Vec<(usize, Column)>, DataError> {
     let mut seen = HashSet::new();
@@ -24,7 +25,7 @@ pub(crate) fn match_header(
             help: "rename or remove one of them".to_owned(),
         });
     }
-    let known: HashSet<&str> = columns.iter().map(|column| column.name.as_ref()).collect();
+    let known: HashSet<&str> = columns.iter().chain(written).map(|column| column.name.as_ref()).collect();
     let strangers: Vec<&str> =
         found.iter().map(String::as_str).filter(|name| !known.contains(name)).collect();
     let absent = |column: &&Column| !seen.contains(column.name.as_ref());

@@ -14,19 +14,26 @@ use crate::error::{DataError, Place};
 use crate::format::{Content, json};
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
+use crate::remarks::Remarks;
 use crate::sheet::{Cells, Sheet};
+use crate::source::text;
 
 pub(crate) use detections::{DetectionRow, Rows, detection_columns};
 pub(crate) use header::{match_header, near_miss};
-pub(crate) use tracks::{fill_tracks, track_columns};
+pub(crate) use tracks::TrackColumns;
 
 /// A table that can lie in columns.
 pub(crate) trait Layout: Sized {
     /// Name of the table in the description of a file.
     const TABLE: &'static str;
 
-    /// The columns of a file with this description, in the order in which they are written.
+    /// The columns of a file with this description that are read.
     fn columns(metadata: &Metadata) -> Vec<Column>;
+
+    /// The columns of a file with this description in the order in which they are written; some may follow from others.
+    fn written(metadata: &Metadata) -> Vec<Column> {
+        Self::columns(metadata)
+    }
 
     /// The description of a file that has none, from the names of its columns.
     fn guess(_found: &[String]) -> Metadata {
@@ -36,7 +43,7 @@ pub(crate) trait Layout: Sized {
     /// The description of this table, without units.
     fn metadata(&self) -> Metadata;
 
-    /// Appends the rows of this table to a sheet of [`Layout::columns`]. Row numbers in errors count from 0.
+    /// Appends the rows of this table to a sheet of [`Layout::written`]. Row numbers in errors count from 0.
     fn fill(&self, sheet: &mut Sheet, file: &Arc<str>) -> Result<(), DataError>;
 
     /// The table of a stream of JSON lines.
@@ -44,8 +51,11 @@ pub(crate) trait Layout: Sized {
         reader: &mut dyn BufRead,
         file: &Arc<str>,
         options: &ReadOptions,
+        remarks: &mut Remarks,
     ) -> Result<Self, DataError> {
-        let Content { sheet, metadata, found } = json::read::<Self>(reader, file, options)?;
+        let mut text = text(reader, file)?;
+        let Content { sheet, metadata, found } = json::read::<Self>(text.reader.as_mut(), file, options)?;
+        remarks.notes.extend(text.note());
         Self::from_sheet(&sheet, metadata, &Context { file, options, found: &found })
     }
 

@@ -3,11 +3,19 @@
 use std::sync::Arc;
 
 use super::{Context, EXTENT, Group, Layout, extent_columns};
-use crate::column::{Column, Kind, Limits};
+use crate::column::{Column, Kind, Limits, Written};
+use crate::earth::Navigator;
 use crate::error::{DataError, Place, Refusal};
 use crate::metadata::Metadata;
 use crate::sheet::{Cells, Sheet};
-use crate::table::{Status, Track, Tracks};
+use crate::table::{Origin, Status, Track, Tracks};
+
+/// Degrees, since that is how people and other programs hold them. Seven decimals are 1 cm.
+const LATITUDE: Column = Column::real("latitude", "deg", Limits::Finite).written(Written::Decimals(7));
+const LONGITUDE: Column = Column::real("longitude", "deg", Limits::Finite).written(Written::Decimals(7));
+const ALTITUDE: Column = Column::real("altitude", "m", Limits::Finite).written(LENGTH);
+const SPEED: Column = Column::real("speed", "m/s", Limits::NotNegative).written(Written::Decimals(3));
+const COURSE: Column = Column::real("course", "deg", Limits::Finite).written(Written::Decimals(2));
 
 /// Components of a state that are known by name, in the order of a state.
 const COMPONENTS: [(&str, &str); 10] = [
@@ -40,74 +48,156 @@ fn covariance_names(labels: &[String]) -> impl Iterator<Item = (&str, &str)> {
     labels.iter().enumerate().flat_map(|(i, a)| labels[i..].iter().map(move |b| (a.as_str(), b.as_str())))
 }
 
-/// The columns for these states and modes.
-pub(crate) fn track_columns(labels: &[String], modes: &[String]) -> Vec<Column> {
-    let mut columns = vec![
-        Column::time(),
-        Column::text("sensor"),
-        Column::count("track").needed(),
-        Column::text("status"),
-        Column::real("existence", "", Limits::Probability),
-    ];
-    columns.extend(labels.iter().map(|label| Column::named(label.clone(), unit(label).to_owned()).needed()));
-    columns
-        .extend(covariance_names(labels).map(|(a, b)| Column::named(format!("cov_{a}_{b}"), product(a, b))));
-    columns.extend(modes.iter().map(|mode| Column {
-        kind: Kind::Real(Limits::Probability),
-        ..Column::named(format!("mode_{mode}"), String::new())
-    }));
-    columns.extend(extent_columns());
-    columns.push(Column::text("identity"));
-    columns.push(Column::count("detection"));
-    columns
+/// Rounding of what is estimated: far below what any covariance of it says, and at most 0.05 mm for lengths.
+const LENGTH: Written = Written::Digits { digits: 7, decimals: 4 };
+const NUMBER: Written = Written::Digits { digits: 7, decimals: 0 };
+const SHARE: Written = Written::Decimals(7);
+
+/// Columns before the state.
+const HEAD: usize = 5;
+
+/// A component of the state; of one that is not known by name, nobody can say which digits matter.
+fn component(label: &str) -> Column {
+    let unit = unit(label);
+    let written = match unit {
+        "m" => LENGTH,
+        "" => Written::Exactly,
+        _ => NUMBER,
+    };
+    Column::named(label.to_owned(), unit.to_owned()).written(written).needed()
 }
 
-/// Appends tracks to a sheet of [`track_columns`].
-pub(crate) fn fill_tracks(
-    sheet: &mut Sheet,
-    rows: &[Track],
-    labels: &[String],
-    modes: &[String],
-    file: &Arc<str>,
-) -> Result<(), DataError> {
-    let n = labels.len();
-    let entries = n * (n + 1) / 2;
-    for track in rows {
+/// How rows of tracks lie in columns.
+pub(crate) struct TrackColumns {
+    labels: Vec<String>,
+    modes: Vec<String>,
+    navigator: Navigator,
+    /// Whether there may be an altitude beside the state, which has no height of its own.
+    beside: bool,
+}
+
+impl TrackColumns {
+    /// For states with these components, in a frame at this origin.
+    pub fn new(origin: Option<Origin>, labels: &[String], modes: &[String]) -> Self {
+        TrackColumns {
+            labels: labels.to_vec(),
+            modes: modes.to_vec(),
+            navigator: Navigator::new(origin, labels),
+            beside: origin.is_some() && !labels.iter().any(|label| label == "z" || label == "altitude"),
+        }
+    }
+
+    /// The columns that are read.
+    fn columns(&self) -> Vec<Column> {
+        let head: [Column; HEAD] = [
+            Column::time(),
+            Column::text("sensor"),
+            Column::count("track").needed(),
+            Column::text("status"),
+            Column::real("existence", "", Limits::Probability).written(SHARE),
+        ];
+        let mut columns = Vec::from(head);
+        columns.extend(self.labels.iter().map(|label| component(label)));
+        columns.extend(self.beside.then_some(ALTITUDE));
+        columns.push(Column::text("identity"));
+        columns.extend(
+            covariance_names(&self.labels)
+                .map(|(a, b)| Column::named(format!("cov_{a}_{b}"), product(a, b)).written(NUMBER)),
+        );
+        columns.extend(self.modes.iter().map(|mode| Column {
+            kind: Kind::Real(Limits::Probability),
+            written: SHARE,
+            ..Column::named(format!("mode_{mode}"), String::new())
+        }));
+        columns.extend(extent_columns().map(|column| column.written(LENGTH)));
+        columns.push(Column::count("detection"));
+        columns
+    }
+
+    /// The columns that follow from the others: written for people, passed over by readers. A component of the state that has
+    /// the name of one takes its place.
+    fn derived(&self) -> Vec<Column> {
+        let mut columns = Vec::new();
+        if self.navigator.knows_the_earth() {
+            columns.extend([LATITUDE, LONGITUDE]);
+            columns.extend((!self.beside).then_some(ALTITUDE));
+        }
+        if self.navigator.knows_speeds() {
+            columns.extend([SPEED, COURSE]);
+        }
+        columns.retain(|column| self.labels.iter().all(|label| *label != column.name));
+        columns
+    }
+
+    /// The columns that are written: the derived ones follow the state.
+    pub fn written(&self) -> Vec<Column> {
+        let mut columns = self.columns();
+        let at = HEAD + self.labels.len();
+        columns.splice(at..at, self.derived());
+        columns
+    }
+
+    /// Appends rows to a sheet of [`TrackColumns::written`].
+    pub fn fill(&self, sheet: &mut Sheet, rows: &[Track], file: &Arc<str>) -> Result<(), DataError> {
+        let n = self.labels.len();
+        let entries = n * (n + 1) / 2;
+        let derived = self.derived();
+        for track in rows {
+            self.check(track, || sheet.place(file, sheet.len()))?;
+            let fix = self.navigator.fix(track);
+            let [latitude, longitude] = fix.position.map_or([None; 2], |place| place.map(Some));
+            let mut filler = sheet.filler();
+            filler.real(track.time).text(Some(&track.sensor)).count(track.track);
+            filler.text(Some(&Arc::from(track.status.name()))).real(track.existence);
+            filler.reals(track.state.iter().copied().map(Some));
+            filler.reals(derived.iter().map(|column| match column.name.as_ref() {
+                "latitude" => latitude,
+                "longitude" => longitude,
+                "altitude" => fix.altitude,
+                "speed" => fix.speed,
+                _ => fix.course,
+            }));
+            filler.reals(self.beside.then_some(track.altitude)).text(track.identity.as_ref());
+            filler.reals((0..entries).map(|i| track.covariance.get(i).copied()));
+            filler.reals(track.modes.iter().copied().map(Some));
+            match track.extent {
+                Some(extent) => filler.reals(extent.map(Some)),
+                None => filler.reals([None; 3]),
+            };
+            filler.count(track.detection);
+        }
+        Ok(())
+    }
+
+    /// Refuses a row whose state is not the one that the labels name.
+    pub fn check(&self, track: &Track, place: impl FnOnce() -> Place) -> Result<(), DataError> {
+        let (n, modes) = (self.labels.len(), self.modes.len());
+        let entries = n * (n + 1) / 2;
         let lengths = [track.state.len(), track.modes.len()];
         let covariance = track.covariance.len();
-        if lengths != [n, modes.len()] || (covariance != entries && covariance != 0) {
-            return Err(DataError::Row {
-                place: sheet.place(file, sheet.len()),
-                problem: format!(
-                    "track {} has {} components, {covariance} covariances and {} modes; expected {n}, {entries} and {}",
-                    track.track,
-                    lengths[0],
-                    lengths[1],
-                    modes.len()
-                ),
-                help: "give every row the state that the labels of the table name",
-            });
+        if lengths == [n, modes] && (covariance == entries || covariance == 0) {
+            return Ok(());
         }
-        let mut filler = sheet.filler();
-        filler.real(track.time).text(Some(&track.sensor)).count(track.track);
-        filler.text(Some(&Arc::from(track.status.name()))).real(track.existence);
-        filler.reals(track.state.iter().copied().map(Some));
-        filler.reals((0..entries).map(|i| track.covariance.get(i).copied()));
-        filler.reals(track.modes.iter().copied().map(Some));
-        match track.extent {
-            Some(extent) => filler.reals(extent.map(Some)),
-            None => filler.reals([None; 3]),
-        };
-        filler.text(track.identity.as_ref()).count(track.detection);
+        Err(DataError::Row {
+            place: place(),
+            problem: format!(
+                "track {} has {} components, {covariance} covariances and {} modes; expected {n}, {entries} and {modes}",
+                track.track, lengths[0], lengths[1],
+            ),
+            help: "give every row the state that the labels of the table name",
+        })
     }
-    Ok(())
 }
 
 impl Layout for Tracks {
     const TABLE: &'static str = "tracks";
 
     fn columns(metadata: &Metadata) -> Vec<Column> {
-        track_columns(&metadata.labels, &metadata.modes)
+        TrackColumns::new(metadata.origin, &metadata.labels, &metadata.modes).columns()
+    }
+
+    fn written(metadata: &Metadata) -> Vec<Column> {
+        TrackColumns::new(metadata.origin, &metadata.labels, &metadata.modes).written()
     }
 
     /// Without a description the state is made of the components that are known by name.
@@ -134,7 +224,7 @@ impl Layout for Tracks {
     }
 
     fn fill(&self, sheet: &mut Sheet, file: &Arc<str>) -> Result<(), DataError> {
-        fill_tracks(sheet, &self.rows, &self.labels, &self.modes, file)
+        TrackColumns::new(self.origin, &self.labels, &self.modes).fill(sheet, &self.rows, file)
     }
 
     fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError> {
@@ -158,6 +248,7 @@ struct Reader<'a> {
     covariance: Vec<Cells<'a, f64>>,
     modes: Vec<Cells<'a, f64>>,
     extent: Group<'a, 3>,
+    altitude: Cells<'a, f64>,
     identity: Cells<'a, Arc<str>>,
     detection: Cells<'a, u64>,
 }
@@ -176,6 +267,7 @@ impl<'a> Reader<'a> {
             covariance: covariance_names(labels).map(|(a, b)| sheet.reals(&format!("cov_{a}_{b}"))).collect(),
             modes: modes.iter().map(|mode| sheet.reals(&format!("mode_{mode}"))).collect(),
             extent: Group::new(sheet, EXTENT),
+            altitude: sheet.reals("altitude"),
             identity: sheet.texts("identity"),
             detection: sheet.counts("detection"),
         }
@@ -203,6 +295,7 @@ impl<'a> Reader<'a> {
             covariance,
             modes,
             extent: self.extent.get(row, place)?,
+            altitude: self.altitude.get(row),
             identity: self.identity.get(row),
             detection: self.detection.get(row),
         })

@@ -97,6 +97,26 @@ impl Description {
     pub fn is_empty(&self) -> bool {
         *self == Description::default()
     }
+
+    /// What is known of a recording that this one and `other` were joined into: the source if it is that of both, and of a
+    /// sensor what holds for both.
+    pub fn joined(mut self, other: Description) -> Description {
+        self.source = self.source.filter(|source| other.source.as_ref() == Some(source));
+        for (name, theirs) in other.sensors {
+            let ours = self.sensors.entry(name).or_insert_with(|| theirs.clone());
+            *ours = SensorDescription {
+                reports: ours.reports && theirs.reports,
+                identity: ours.identity && theirs.identity,
+                interval: ours.interval.zip(theirs.interval).map(|(ours, theirs)| ours.min(theirs)),
+            };
+        }
+        self
+    }
+
+    /// True when every sensor is known to report objects one by one, so that a report says nothing of other objects.
+    pub fn all_report(&self) -> bool {
+        !self.sensors.is_empty() && self.sensors.values().all(|sensor| sensor.reports)
+    }
 }
 
 /// The measured components.

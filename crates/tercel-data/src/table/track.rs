@@ -39,6 +39,9 @@ pub struct Track {
     pub modes: Vec<f64>,
     /// Extent of the object: semi-axes (m) and orientation of the first (rad), if it is estimated.
     pub extent: Option<[f64; 3]>,
+    /// Height above the WGS84 ellipsoid that detections gave last, m, where the state has no height of its own. Files keep it
+    /// where the table has an origin.
+    pub altitude: Option<f64>,
     /// What the object is called, where sensors said so.
     pub identity: Option<std::sync::Arc<str>>,
     /// The detection that updated the track in this scan, if one did.

@@ -101,7 +101,7 @@ pub fn truths() -> impl Strategy<Value = Truths> {
 
 const STATES: [&[&str]; 3] = [&["x", "y"], &["x", "y", "vx", "vy"], &["x", "y", "vx", "vy", "turn_rate"]];
 
-fn track(n: usize, modes: usize) -> impl Strategy<Value = Track> {
+fn track(n: usize, modes: usize, on_earth: bool) -> impl Strategy<Value = Track> {
     let extent = (positive(), positive(), finite()).prop_map(|(a, b, angle)| [a, b, angle]);
     let status = proptest::sample::select(vec![
         Status::Tentative,
@@ -112,13 +112,14 @@ fn track(n: usize, modes: usize) -> impl Strategy<Value = Track> {
     let covariance = prop_oneof![Just(Vec::new()), vec(finite(), n * (n + 1) / 2)];
     let head = (finite(), prop_oneof![name(), Just("".into())], any::<u64>(), status, 0.0..=1.0);
     let state = (vec(finite(), n), covariance, vec(0.0..=1.0, modes));
+    let altitude = option::of(finite()).prop_map(move |altitude| altitude.filter(|_| on_earth));
     let name = option::of(name());
-    (head, state, option::of(extent), name, option::of(any::<u64>())).prop_map(
+    (head, state, option::of(extent), (altitude, name), option::of(any::<u64>())).prop_map(
         |(
             (time, sensor, track, status, existence),
             (state, covariance, modes),
             extent,
-            identity,
+            (altitude, identity),
             detection,
         )| Track {
             time,
@@ -130,6 +131,7 @@ fn track(n: usize, modes: usize) -> impl Strategy<Value = Track> {
             covariance,
             modes,
             extent,
+            altitude,
             identity,
             detection,
         },
@@ -141,7 +143,7 @@ pub fn tracks() -> impl Strategy<Value = Tracks> {
         let labels: Vec<String> = STATES[state].iter().map(|label| (*label).to_owned()).collect();
         let modes: Vec<String> =
             ["straight", "turn, \"left\" "][..modes].iter().map(|m| (*m).to_owned()).collect();
-        vec(track(labels.len(), modes.len()), 0..5).prop_map(move |rows| Tracks {
+        vec(track(labels.len(), modes.len(), origin.is_some()), 0..5).prop_map(move |rows| Tracks {
             origin,
             labels: labels.clone(),
             modes: modes.clone(),

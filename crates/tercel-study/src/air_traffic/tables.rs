@@ -78,6 +78,7 @@ pub fn tracks(recording: &Recording, estimates: &[StepEstimate], track: u64) -> 
             covariance: estimate.covariance.as_ref().map(upper).unwrap_or_default(),
             modes: estimate.manoeuvres.filter(|_| told).map_or(Vec::new(), |chances| chances.to_vec()),
             extent: None,
+            altitude: None,
             identity: None,
             detection: plot.is_some().then_some(step as u64),
         }

@@ -63,6 +63,7 @@ pub fn tracks(recording: &Recording, reported: &[Vec<Reported>], first: u64) -> 
             covariance: Vec::new(),
             modes: Vec::new(),
             extent: None,
+            altitude: None,
             identity: None,
             detection: None,
         }));

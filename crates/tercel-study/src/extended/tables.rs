@@ -70,6 +70,7 @@ pub(crate) fn row(time: f64, track: u64, place: Vector2<f64>, ellipse: Option<&E
         covariance: Vec::new(),
         modes: Vec::new(),
         extent: ellipse.map(extent),
+        altitude: None,
         identity: None,
         detection: None,
     }

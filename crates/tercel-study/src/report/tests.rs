@@ -24,6 +24,7 @@ fn tracks(name: &str, number: f64) -> Tracks {
         covariance: vec![number; 10],
         modes: vec![number],
         extent: Some([number; 3]),
+        altitude: None,
         identity: None,
         detection: Some(1),
     };

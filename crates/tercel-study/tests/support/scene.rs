@@ -205,6 +205,7 @@ impl Making {
             covariance: covariance(sigma, y.atan2(x)),
             modes: vec![1.0 - turning, turning],
             extent: None,
+            altitude: None,
             identity: None,
             detection,
         });
@@ -228,6 +229,7 @@ impl Making {
                     covariance: covariance(14.0, 0.0),
                     modes: vec![0.5, 0.5],
                     extent: None,
+                    altitude: None,
                     identity: None,
                     detection: None,
                 });

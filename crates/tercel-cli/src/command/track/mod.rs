@@ -1,22 +1,29 @@
 //! `tercel track`.
 
+mod altitudes;
 mod outcome;
+mod preset;
+mod rows;
 mod run;
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use tercel_data::ndjson::Scans;
-use tercel_data::table::{Scan, Truths};
+use tercel_data::table::{Origin, Scan, Truths};
 use tercel_data::{DataError, ImportOptions, Imported, Source};
-use tercel_pipeline::{Config, Pipeline, PipelineError};
+use tercel_pipeline::PipelineError;
 
 use self::outcome::Outcome;
-use self::run::Run;
-use super::config;
+use self::preset::{Chosen, Recording};
+use self::rows::Rows;
+use self::run::{Run, Wanted};
+use crate::account::Account;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::input::{self, ReadArguments, STDIN, is_stdin, note_left_out};
+use crate::origin;
 use crate::output::{Target, keep_inputs};
 use crate::progress::Progress;
 use crate::score::ScoreArguments;
@@ -24,19 +31,21 @@ use crate::score::ScoreArguments;
 /// Turn detections into tracks.
 ///
 /// INPUT is a table of detections (CSV, Parquet or NDJSON), a recording that `tercel convert` knows, or - for standard
-/// input. From standard input NDJSON is tracked line by line: the rows of each scan go out before the next one is read, to
+/// input; several files of one kind are tracked as one recording. From standard input NDJSON is tracked line by line: the rows of each scan go out before the next one is read, to
 /// standard output unless -o names a file. From a file without -o, the tracks are only counted and scored.
 ///
-/// The table of tracks has one row per track and scan: confirmed and coasted tracks, and the row with which such a track is
-/// given up. With --all tentative tracks are rows as well.
+/// The table of tracks has rows of confirmed and coasted tracks, and the row with which such a track is given up; with --all
+/// also of tentative ones. --rows says how many. Where the origin of the local frame is known, rows have latitude, longitude,
+/// speed and course as well, and tracks may go to a map: GeoJSON for geographic programs, KML for globes, GPX for plotters.
 ///
 /// The summary accounts for every detection of the scans that were tracked: it updated a track, started a tentative one, or
 /// is counted as clutter. Scans that came too late and those of sensors that the configuration ignores are counted apart.
 #[derive(Debug, Args)]
 #[command(after_long_help = AFTER)]
 pub struct TrackArguments {
-    /// The detections; - is standard input.
-    input: PathBuf,
+    /// The detections; - is standard input. Several files of one kind are joined.
+    #[arg(required = true)]
+    input: Vec<PathBuf>,
     /// Configuration (TOML); without it, one that comes with the program and fits the kind of recording.
     #[arg(long, short, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -45,9 +54,17 @@ pub struct TrackArguments {
     truth: Option<PathBuf>,
     #[command(flatten)]
     read: ReadArguments,
-    /// Table of tracks to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON).
-    #[arg(long, short, value_name = "FILE", value_parser = Target::parse)]
+    /// Table of tracks to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON), or map (.geojson, .kml, .gpx).
+    #[arg(long, short, value_name = "FILE", value_parser = Target::parse_tracks)]
     output: Option<Target>,
+    /// Rows to write of a track: `updates`, when a detection updated it; `scans`, after every scan; a number, at most one in so
+    /// many seconds. Changes of its status and its end always have a row [default: updates where all sensors report objects
+    /// one by one, as AIS and ADS-B do; scans otherwise].
+    #[arg(long, value_name = "WHICH", value_parser = Rows::parse, allow_negative_numbers = true)]
+    rows: Option<Rows>,
+    /// Origin of the local frame, degrees and m; without it, that of the table or the median position of the reports.
+    #[arg(long, value_name = "LAT,LON[,ALT]", value_parser = origin::parse, allow_hyphen_values = true)]
+    origin: Option<Origin>,
     /// Write tentative tracks as well.
     #[arg(long)]
     all: bool,
@@ -77,6 +94,9 @@ enum OnError {
 const AFTER: &str = "\
 Examples:
   tercel track radar.csv -o tracks.parquet --report report.html
+  tercel track monday.csv tuesday.csv --from ais -o ships.geojson
+  tercel track states.csv --rows 10 -o aircraft.kml
+  tercel track radar.csv --origin 54.18,7.89 -o tracks.gpx
   tercel track data/autoferry/scenario2 --config tracker.toml --json
   tercel track --from csv --angles degrees radar.csv --truth truth.csv -o tracks.csv
   sensor | tercel track - --config tracker.toml --on-error skip | consumer";
@@ -85,7 +105,7 @@ impl TrackArguments {
     /// Tracks the input and says how it went.
     pub fn run(&self, console: &Console) -> Result<(), Failure> {
         self.check()?;
-        let stream = is_stdin(&self.input) && matches!(self.read.from, None | Some(Source::Ndjson));
+        let stream = self.is_piped() && matches!(self.read.from, None | Some(Source::Ndjson));
         if self.on_error == OnError::Skip && !stream {
             let message = "--on-error skip is for NDJSON on standard input";
             return Err(Failure::usage(message));
@@ -94,9 +114,23 @@ impl TrackArguments {
         outcome.write(self, console)
     }
 
+    /// True when the input is standard input.
+    fn is_piped(&self) -> bool {
+        self.input.iter().any(|path| is_stdin(path))
+    }
+
+    /// The inputs in messages.
+    fn input_name(&self) -> String {
+        if self.is_piped() {
+            return STDIN.to_owned();
+        }
+        let names: Vec<_> = self.input.iter().map(|path| path.to_string_lossy()).collect();
+        names.join(", ")
+    }
+
     /// Where the tracks go: what comes from standard input goes to standard output.
     fn target(&self) -> Option<Target> {
-        let default = || is_stdin(&self.input).then_some(Target::Stdout);
+        let default = || self.is_piped().then_some(Target::Stdout);
         self.output.clone().or_else(default)
     }
 
@@ -112,8 +146,12 @@ impl TrackArguments {
         if tracks.is_some() && tracks == self.report.as_deref() {
             return conflict("-o and --report name the same file");
         }
-        let inputs = [Some(&*self.input), self.truth.as_deref(), self.config.as_deref()];
-        let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+        if self.input.len() > 1 && self.is_piped() {
+            return conflict("standard input cannot be joined with files");
+        }
+        let others = [self.truth.as_deref(), self.config.as_deref()];
+        let inputs: Vec<&Path> =
+            self.input.iter().map(PathBuf::as_path).chain(others.into_iter().flatten()).collect();
         keep_inputs([tracks, self.report.as_deref()].into_iter().flatten(), &inputs)?;
         // Found now rather than after hours of tracking.
         let Some(folder) = self.report.as_deref().and_then(Path::parent) else { return Ok(()) };
@@ -123,42 +161,61 @@ impl TrackArguments {
         Ok(())
     }
 
+    fn wanted(&self, truths: Option<&Truths>) -> Wanted {
+        let keep = truths.is_some() || self.report.is_some();
+        Wanted { target: self.target(), rows: self.rows, all: self.all, keep }
+    }
+
     fn run_file(&self, console: &Console) -> Result<Outcome, Failure> {
-        let source = self.read.source(&self.input)?;
-        let (config, pipeline, name) = self.configuration(source, console)?;
+        let named = self.config.as_deref().map(Chosen::read).transpose()?;
+        let source = self.read.source(&self.input[0])?;
         // What aircraft and ships say of themselves is the detections here; it cannot be their truth as well.
         let truths = source == Source::Autoferry && self.truth.is_none();
-        let options = ImportOptions { truths, ..ImportOptions::default() };
-        let Imported { detections, truths, left_out } =
-            self.read.import(source, std::slice::from_ref(&self.input), options, console)?;
-        note_left_out(&Imported { left_out, ..Imported::default() }, console);
+        let options = ImportOptions { truths, origin: self.origin, ..ImportOptions::default() };
+        let started = Instant::now();
+        let imported = self.read.import(source, &self.input, options, console)?;
+        let reading = started.elapsed();
+        note_left_out(&imported, console);
+        let Imported { detections, truths, left_out, .. } = imported;
+        let chosen = match named {
+            Some(chosen) => chosen,
+            None => Recording::whole(source, &detections).preset(console)?,
+        };
         let truths = self.truths(truths)?;
-        let target = self.target();
-        if target.is_none() {
+        let wanted = self.wanted(truths.as_ref());
+        if wanted.target.is_none() {
             console.note("the tracks are counted only; -o FILE writes them");
         }
-        let mut run = Run::new(pipeline, target, self.all, truths.is_some() || self.report.is_some());
-        run.begin(detections.origin)?;
+        let mut run = Run::new(chosen.pipeline, wanted);
+        run.begin(origin::settle(detections.origin, self.origin)?, detections.description)?;
         let progress = Progress::bar(console, "tracking", detections.scans.len());
         for scan in detections.scans {
-            let rows = run.track(scan).map_err(|error| self.refused(error))?;
-            run.hand_on(rows)?;
+            run.track(scan)?.map_err(|error| self.refused(error))?;
             progress.step();
         }
         drop(progress);
-        let rows = run.end().map_err(|error| self.refused(error))?;
-        run.hand_on(rows)?;
-        Ok(Outcome { run, truths, config, configuration: name, bad: 0 })
+        run.end()?.map_err(|error| self.refused(error))?;
+        let (config, configuration) = (chosen.config, chosen.name);
+        Ok(Outcome { run, truths, config, configuration, left_out: Account::of(left_out), bad: 0, reading })
     }
 
     fn run_stream(&self, console: &Console) -> Result<Outcome, Failure> {
-        let (config, pipeline, name) = self.configuration(Source::Ndjson, console)?;
+        let named = self.config.as_deref().map(Chosen::read).transpose()?;
         let truths = self.truths(None)?;
-        let mut run = Run::new(pipeline, self.target(), self.all, truths.is_some() || self.report.is_some());
         let mut scans = Scans::new(std::io::stdin().lock(), STDIN, self.read.options());
+        // What the stream was before stands in its first line; without it nobody can choose a configuration.
+        let mut next = scans.next();
+        let chosen = match named {
+            Some(chosen) => chosen,
+            None => {
+                let first = next.as_ref().and_then(|scan| scan.as_ref().ok());
+                Recording::beginning(scans.description(), first).preset(console)?
+            }
+        };
+        let mut run = Run::new(chosen.pipeline, self.wanted(truths.as_ref()));
         let mut bad = 0;
-        while let Some(scan) = scans.next() {
-            run.begin(scans.origin())?;
+        while let Some(scan) = next {
+            run.begin(origin::settle(scans.origin(), self.origin)?, scans.description())?;
             match self.track_one(&mut run, scan)? {
                 Ok(()) => {}
                 Err(failure) if self.on_error == OnError::Skip => {
@@ -169,34 +226,13 @@ impl TrackArguments {
                 }
                 Err(failure) => return Err(failure),
             }
+            next = scans.next();
         }
-        run.begin(scans.origin())?;
-        let rows = run.end().map_err(|error| self.refused(error))?;
-        run.hand_on(rows)?;
-        Ok(Outcome { run, truths, config, configuration: name, bad })
-    }
-
-    /// The configuration, its tracker and its name. One that the user did not choose is named on standard error.
-    fn configuration(
-        &self,
-        source: Source,
-        console: &Console,
-    ) -> Result<(Config, Pipeline, String), Failure> {
-        if let Some(path) = &self.config {
-            let (config, pipeline) = config::read(path)?;
-            return Ok((config, pipeline, path.to_string_lossy().into_owned()));
-        }
-        let name = match source {
-            Source::Autoferry => "harbour",
-            Source::Adsb => "adsb",
-            Source::Ais => "ais",
-            Source::Csv | Source::Parquet | Source::Ndjson => "default",
-        };
-        console.note(format_args!(
-            "using the configuration `{name}`; `tercel config init --preset {name} -o FILE` writes it for changes"
-        ));
-        let (config, pipeline) = config::preset(name)?;
-        Ok((config, pipeline, name.to_owned()))
+        run.begin(origin::settle(scans.origin(), self.origin)?, scans.description())?;
+        run.end()?.map_err(|error| self.refused(error))?;
+        let (config, configuration) = (chosen.config, chosen.name);
+        let (left_out, reading) = (Account::default(), Duration::ZERO);
+        Ok(Outcome { run, truths, config, configuration, left_out, bad, reading })
     }
 
     fn truths(&self, found: Option<Truths>) -> Result<Option<Truths>, Failure> {
@@ -217,8 +253,8 @@ impl TrackArguments {
             Err(error) if error.is_io() => return Err(error.into()),
             Err(error) => return Ok(Err(error.into())),
         };
-        match run.track(scan) {
-            Ok(rows) => run.hand_on(rows).map(Ok),
+        match run.track(scan)? {
+            Ok(()) => Ok(Ok(())),
             Err(error @ (PipelineError::UnknownSensor { .. } | PipelineError::Observation { .. })) => {
                 Ok(Err(self.refused(error)))
             }
@@ -228,7 +264,6 @@ impl TrackArguments {
 
     /// A scan that the tracker refuses, with the name of the input.
     fn refused(&self, error: PipelineError) -> Failure {
-        let file = if is_stdin(&self.input) { STDIN.into() } else { self.input.to_string_lossy() };
-        Failure::from(error).found_in(&file)
+        Failure::from(error).found_in(&self.input_name())
     }
 }

@@ -1,6 +1,7 @@
 //! What is said and written when tracking is over.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 use tercel_data::table::Truths;
@@ -9,7 +10,8 @@ use tercel_study::evaluate::Evaluation;
 use tercel_study::report::{self, Chart, Form, Picture, Report, SensorNote};
 
 use super::TrackArguments;
-use super::run::Run;
+use super::run::{Run, Untracked};
+use crate::account::Account;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::{Target, print, print_json};
@@ -26,13 +28,21 @@ pub struct Outcome {
     pub config: Config,
     /// Name of the configuration.
     pub configuration: String,
+    /// Rows that the reader left out.
+    pub left_out: Account,
     /// Lines and scans of standard input that could not be used.
     pub bad: u64,
+    /// Time that reading took; nothing for a stream, which is waited for.
+    pub reading: Duration,
 }
 
 impl Outcome {
     /// Scores the tracks, puts the outputs in their places and prints the summary.
     pub fn write(mut self, arguments: &TrackArguments, console: &Console) -> Result<(), Failure> {
+        let Untracked { late, ignored } = self.run.untracked;
+        self.left_out.add("a scan that came too late", late);
+        self.left_out.add("a sensor that the configuration ignores", ignored);
+        self.left_out.add("a line or scan that cannot be used", self.bad);
         let evaluation = match &self.truths {
             Some(truths) => {
                 let times = self.run.seen.scans.iter().map(|scan| scan.time).collect();
@@ -45,7 +55,8 @@ impl Outcome {
             let _progress = Progress::spinner(console, "writing the report");
             self.report(arguments, evaluation)?.write(path)?;
         }
-        self.run.finish()?;
+        self.run.finish(console)?;
+        self.left_out.say_briefly(console);
         let late = self.run.summary().late;
         if late > 0 {
             let late = counted(late, "scan");
@@ -83,9 +94,9 @@ impl Outcome {
             count(summary.starts),
             count(summary.clutter)
         );
-        vec![
-            ("scans", scans),
-            ("detections", uses),
+        let mut figures = vec![("scans", scans), ("detections", uses)];
+        figures.extend(self.left_out.sentence().map(|sentence| ("left out", sentence)));
+        figures.extend([
             ("tracks", format!("{} confirmed", count(summary.confirmed))),
             (
                 "speed",
@@ -94,12 +105,18 @@ impl Outcome {
                     speed => format!("{} scans/s", count(speed as u64)),
                 }),
             ),
-        ]
+        ]);
+        figures
     }
 
-    /// Scans per second of the tracker itself.
+    /// Time for reading, tracking and writing, s.
+    fn seconds(&self) -> f64 {
+        self.reading.as_secs_f64() + self.run.seconds()
+    }
+
+    /// Scans per second, from the file to the tracks.
     fn speed(&self) -> Option<f64> {
-        let speed = self.run.summary().scans as f64 / self.run.seconds();
+        let speed = self.run.summary().scans as f64 / self.seconds();
         speed.is_finite().then_some(speed)
     }
 
@@ -120,7 +137,8 @@ impl Outcome {
         let target = arguments.target();
         let path = |path: Option<&Path>| path.map(|path| path.to_string_lossy().into_owned());
         json!({
-            "input": arguments.input.to_string_lossy(),
+            "input": arguments.input[0].to_string_lossy(),
+            "inputs": arguments.input.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(),
             "configuration": self.configuration,
             "scans": {
                 "read": self.run.scans,
@@ -134,10 +152,11 @@ impl Outcome {
                 "updated": summary.updates,
                 "started": summary.starts,
                 "clutter": summary.clutter,
-                "left_out": self.run.left_out,
+                "left_out": self.run.untracked.late + self.run.untracked.ignored,
             },
+            "left_out": self.left_out.json(),
             "confirmed_tracks": summary.confirmed,
-            "seconds": self.run.seconds(),
+            "seconds": self.seconds(),
             "scans_per_second": self.speed(),
             "scores": evaluation.map(|evaluation| arguments.score.json(evaluation)),
             "outputs": {
@@ -174,7 +193,9 @@ impl Outcome {
         if let Some(evaluation) = evaluation {
             picture = picture.with_chart(gospa(evaluation));
         }
-        let title = arguments.input.file_name().unwrap_or(arguments.input.as_os_str()).to_string_lossy();
+        let name =
+            |path: &PathBuf| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let title = arguments.input.iter().map(name).collect::<Vec<_>>().join(", ");
         let scans = counted(self.run.summary().scans, "scan");
         Ok(Report::new(title)
             .with_subtitle(format!("Configuration {}; {scans}", self.configuration))

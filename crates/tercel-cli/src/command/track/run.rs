@@ -1,66 +1,89 @@
 //! One way of scans through a tracker, with its rows handed on as they are made.
 
-use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use tercel_data::table::{Detections, Origin, Scan, Status, Track, Tracks};
+use tercel_data::table::{Description, Detections, Origin, Scan, Track, Tracks};
 use tercel_data::{Format, TracksWriter};
 use tercel_pipeline::{Pipeline, PipelineError, Summary};
 
+use super::altitudes::Altitudes;
+use super::rows::{Rows, Selection};
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::{STDOUT, Target};
+
+/// What is wanted of a run.
+#[derive(Debug, Clone)]
+pub struct Wanted {
+    /// Where the rows go.
+    pub target: Option<Target>,
+    /// Which rows are written; without a choice, the recording tells.
+    pub rows: Option<Rows>,
+    /// Whether tentative tracks are written.
+    pub all: bool,
+    /// Whether scans and rows are kept for scores and the report.
+    pub keep: bool,
+}
 
 /// A tracker at work.
 pub struct Run {
     pipeline: Pipeline,
-    target: Option<Target>,
+    wanted: Wanted,
     writer: Option<TracksWriter<'static>>,
     begun: bool,
-    /// Whether tentative tracks are written.
-    all: bool,
-    /// Tracks that were written and not given up yet.
-    reported: HashSet<u64>,
-    /// What scores and the report need; nothing is kept without them.
-    keep: bool,
-    /// The scans that were tracked.
+    selection: Selection,
+    altitudes: Altitudes,
+    /// The scans that were tracked, if they are kept.
     pub seen: Detections,
-    /// The rows that were written.
+    /// The rows of every scan, if they are kept: scores and the report do not depend on what is written.
     pub tracks: Tracks,
-    /// Scans and detections that came in.
+    /// Scans that came in.
     pub scans: u64,
-    /// Detections of scans that were late or of an ignored sensor.
-    pub left_out: u64,
+    /// Detections that came in and were not tracked.
+    pub untracked: Untracked,
     busy: Duration,
 }
 
+/// Detections that were not tracked.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Untracked {
+    /// Of scans that came too late.
+    pub late: u64,
+    /// Of sensors that the configuration leaves out.
+    pub ignored: u64,
+}
+
 impl Run {
-    /// Prepares to track; with `keep`, scans and rows are kept for scores and the report.
-    pub fn new(pipeline: Pipeline, target: Option<Target>, all: bool, keep: bool) -> Self {
+    /// Prepares to track.
+    pub fn new(pipeline: Pipeline, wanted: Wanted) -> Self {
         let (labels, modes) = (pipeline.labels().to_vec(), pipeline.modes().to_vec());
         Run {
             pipeline,
-            target,
             writer: None,
             begun: false,
-            all,
-            reported: HashSet::new(),
-            keep,
+            selection: Selection::new(wanted.rows.unwrap_or(Rows::Scans), wanted.all),
+            altitudes: Altitudes::default(),
+            wanted,
             seen: Detections::default(),
             tracks: Tracks { labels, modes, ..Tracks::default() },
             scans: 0,
-            left_out: 0,
+            untracked: Untracked::default(),
             busy: Duration::ZERO,
         }
     }
 
-    /// Opens the output, once it is known where the local frame lies. Only the first call does something.
-    pub fn begin(&mut self, origin: Option<Origin>) -> Result<(), Failure> {
+    /// Opens the output, once it is known what the recording is and where its frame lies. Only the first call does something.
+    pub fn begin(&mut self, origin: Option<Origin>, recording: Description) -> Result<(), Failure> {
         if std::mem::replace(&mut self.begun, true) {
             return Ok(());
         }
+        let rows = self.wanted.rows.unwrap_or_else(|| Rows::of(&recording));
+        self.selection = Selection::new(rows, self.wanted.all);
+        self.altitudes = Altitudes::new(origin);
         self.tracks.origin = origin;
         self.seen.origin = origin;
-        self.writer = match &self.target {
+        self.seen.description = recording;
+        self.writer = match &self.wanted.target {
             None => None,
             Some(Target::File(path)) => Some(TracksWriter::create(path, &self.tracks)?),
             Some(Target::Stdout) => {
@@ -70,50 +93,79 @@ impl Run {
         Ok(())
     }
 
-    /// Tracks a scan and returns the rows that it led to.
-    pub fn track(&mut self, scan: Scan) -> Result<Vec<Track>, PipelineError> {
-        let detections = scan.detections.len() as u64;
-        let copy = self.keep.then(|| scan.clone());
-        let before = self.pipeline.summary();
+    /// Tracks a scan and hands on the rows that it led to, so that a reader has them at once. The inner error is one of the
+    /// tracker, after which other scans may follow.
+    pub fn track(&mut self, scan: Scan) -> Result<Result<(), PipelineError>, Failure> {
         let started = Instant::now();
-        let rows = self.pipeline.push(scan)?;
+        let rows = self.push(scan);
+        let handed_on = rows.map(|rows| self.hand_on(rows));
         self.busy += started.elapsed();
+        match handed_on {
+            Ok(handed_on) => handed_on.map(Ok),
+            Err(error) => Ok(Err(error)),
+        }
+    }
+
+    fn push(&mut self, scan: Scan) -> Result<Vec<Track>, PipelineError> {
+        let detections = scan.detections.len() as u64;
+        let copy = self.wanted.keep.then(|| scan.clone());
+        self.altitudes.hear(&scan);
+        let before = self.pipeline.summary();
+        let rows = self.pipeline.push(scan)?;
         let after = self.pipeline.summary();
         self.scans += 1;
-        if (after.late, after.ignored) == (before.late, before.ignored) {
-            self.seen.scans.extend(copy);
+        // A scan without detections is a row of the table as well.
+        if after.late > before.late {
+            self.untracked.late += detections.max(1);
+        } else if after.ignored > before.ignored {
+            self.untracked.ignored += detections.max(1);
         } else {
-            self.left_out += detections;
+            self.seen.scans.extend(copy);
         }
         Ok(rows)
     }
 
-    /// Writes those of the rows that are wanted, so that a reader has them at once.
-    pub fn hand_on(&mut self, mut rows: Vec<Track>) -> Result<(), Failure> {
-        rows.retain(|row| self.wants(row));
+    /// Writes those of the rows that are wanted.
+    fn hand_on(&mut self, mut rows: Vec<Track>) -> Result<(), Failure> {
+        self.altitudes.give(&mut rows);
+        let Summary { scans, late, ignored, .. } = self.pipeline.summary();
+        self.altitudes.forget(self.scans.saturating_sub(scans + late + ignored) as usize);
+        let mut written = Vec::with_capacity(rows.len());
+        for row in rows {
+            if !self.selection.believes(&row) {
+                continue;
+            }
+            let taken = self.selection.takes(&row);
+            if self.wanted.keep {
+                self.tracks.rows.push(row.clone());
+            }
+            written.extend(taken.then_some(row));
+        }
         if let Some(writer) = &mut self.writer {
-            writer.append(&rows)?;
-            if self.target == Some(Target::Stdout) {
+            writer.append(&written)?;
+            if self.wanted.target == Some(Target::Stdout) {
                 writer.flush()?;
             }
-        }
-        if self.keep {
-            self.tracks.rows.extend(rows);
         }
         Ok(())
     }
 
-    /// Tracks what is still held back, and returns its rows.
-    pub fn end(&mut self) -> Result<Vec<Track>, PipelineError> {
+    /// Tracks what is still held back, and hands on its rows.
+    pub fn end(&mut self) -> Result<Result<(), PipelineError>, Failure> {
         let started = Instant::now();
-        let rows = self.pipeline.finish();
+        let handed_on = self.pipeline.finish().map(|rows| self.hand_on(rows));
         self.busy += started.elapsed();
-        rows
+        match handed_on {
+            Ok(handed_on) => handed_on.map(Ok),
+            Err(error) => Ok(Err(error)),
+        }
     }
 
     /// Puts the file of tracks in its place.
-    pub fn finish(&mut self) -> Result<(), Failure> {
-        Ok(self.writer.take().map_or(Ok(()), TracksWriter::finish)?)
+    pub fn finish(&mut self, console: &Console) -> Result<(), Failure> {
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        writer.notes().iter().for_each(|note| console.note(note));
+        Ok(writer.finish()?)
     }
 
     /// What happened to the scans.
@@ -121,20 +173,8 @@ impl Run {
         self.pipeline.summary()
     }
 
-    /// Time spent in the tracker itself, s.
+    /// Time spent on tracking and writing, s.
     pub fn seconds(&self) -> f64 {
         self.busy.as_secs_f64()
-    }
-
-    /// A row is wanted when its track is believed, or was and is given up.
-    fn wants(&mut self, row: &Track) -> bool {
-        match row.status {
-            Status::Confirmed | Status::Coasted => {
-                self.reported.insert(row.track);
-                true
-            }
-            Status::Deleted => self.reported.remove(&row.track) || self.all,
-            Status::Tentative => self.all,
-        }
     }
 }

@@ -207,6 +207,7 @@ mod tests {
             covariance: vec![4.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 1.0, 0.0, 1.0],
             modes: vec![],
             extent: None,
+            altitude: None,
             identity: None,
             detection: Some(time as u64),
         }
