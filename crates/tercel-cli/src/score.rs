@@ -3,7 +3,7 @@
 use clap::Args;
 use serde_json::{Map, Value, json};
 use tercel_data::table::{Tracks, Truths};
-use tercel_study::evaluate::{EvaluateOptions, Evaluation, evaluate};
+use tercel_study::evaluate::{EvaluateOptions, Evaluation, evaluate, scored_times};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -13,7 +13,7 @@ use crate::progress::Progress;
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Scoring")]
 pub struct ScoreArguments {
-    /// Distance in m beyond which a track has nothing to do with an object.
+    /// Distance in m from which on a track has nothing to do with an object.
     #[arg(long, default_value_t = 20.0, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     pub cutoff: f64,
     /// Order of GOSPA and OSPA, 1 or more.
@@ -36,12 +36,13 @@ fn order(text: &str) -> Result<f64, String> {
 }
 
 impl ScoreArguments {
-    /// Scores tracks at the given times, as far as the truth is known then; without times, wherever there is a track.
+    /// Scores tracks at the times of the truth, and at those of the scans or, where none are given, of the tracks. Without
+    /// a time in common nothing is scored, and a warning says so.
     pub fn evaluate(
         &self,
         tracks: &Tracks,
         truths: &Truths,
-        times: Option<Vec<f64>>,
+        scans: Option<Vec<f64>>,
         console: &Console,
     ) -> Result<Evaluation, Failure> {
         if let (Some(ours), Some(theirs)) = (tracks.origin, truths.origin)
@@ -51,11 +52,19 @@ impl ScoreArguments {
                 .with_help("convert the recording and its truth together, with one --origin"));
         }
         let _progress = Progress::spinner(console, "scoring");
+        let times = match common_clock(tracks, truths, scans.as_deref()) {
+            Ok(()) => scans.map(|scans| scored_times(scans, truths)),
+            Err(problem) => {
+                let reason = problem.report().map_or("", |report| &report.message);
+                console.warn(format_args!("the tracks are not scored: {reason}"));
+                Some(Vec::new())
+            }
+        };
         let options = EvaluateOptions {
             cutoff: self.cutoff,
             order: self.order,
             near: self.near,
-            times: times.map(|times| within(times, truths)),
+            times,
             ..EvaluateOptions::default()
         };
         evaluate(tracks, truths, &options)
@@ -82,12 +91,26 @@ impl ScoreArguments {
     }
 }
 
-/// Times in ascending order, each once, between the first and the last of the truth.
-fn within(mut times: Vec<f64>, truths: &Truths) -> Vec<f64> {
-    let known = || truths.rows.iter().map(|row| row.time);
-    let (first, last) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-    times.retain(|time| (first..=last).contains(time));
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    times
+/// Refuses scans or, where none are given, tracks that have no time in common with the truth: their clocks are different
+/// ones. What holds no row has no clock: silence, and the absence of all objects, can be scored.
+pub fn common_clock(tracks: &Tracks, truths: &Truths, scans: Option<&[f64]>) -> Result<(), Failure> {
+    let told = span(truths.rows.iter().map(|row| row.time));
+    let reported = match scans {
+        Some(scans) => span(scans.iter().copied()),
+        None => span(tracks.rows.iter().map(|row| row.time)),
+    };
+    match (told, reported) {
+        (None, None) => Err(Failure::input("neither the tracks nor the truth hold a row")
+            .with_help("one of the two may be empty; both together leave no time to score")),
+        (Some(told), Some(reported)) if reported.1 < told.0 || told.1 < reported.0 => {
+            Err(Failure::input("there is no time at which both tracks and truth are known")
+                .with_help("the times of both must be seconds of the same epoch"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The first and the last time, if there is any.
+fn span(times: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    times.map(|time| (time, time)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }

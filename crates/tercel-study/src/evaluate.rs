@@ -1,30 +1,37 @@
 //! How good tracks are against the truth.
 
+mod holders;
+mod picture;
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use tercel_core::error::FilterError;
-use tercel_core::metric::{Gospa, Ospa, Trajectory, TrajectoryGospa};
+use tercel_core::metric::{Gospa, Ospa, TrajectoryGospa};
 use tercel_data::table::{Tracks, Truths};
 
+use self::holders::Holders;
+use self::picture::{Lives, Picture, Standing};
 use crate::report::{Chart, Form};
-use crate::timeline::{self, Timeline};
+use crate::timeline::{self, Reach, Rule, SAME, Timeline};
 
 /// What counts as found, and when it is looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluateOptions {
-    /// Distance beyond which a track has nothing to do with an object, m: the cut-off of the set metrics, and what counts as
-    /// found.
+    /// Distance from which on a track has nothing to do with an object, m: the cut-off of the set metrics, and what counts as
+    /// found. A pair at the cut-off is no pair.
     pub cutoff: f64,
     /// Order of the set metrics.
     pub order: f64,
-    /// Times to look at, s; without them every time at which a track was reported while the truth is known. Give the times
-    /// of all scans where scans without any track should count as missed.
+    /// Times to look at, s; without them the [`scored_times`] of the tracks and the truth.
     pub times: Option<Vec<f64>>,
     /// Only false tracks within this distance of an object count in the metrics named `near`, m. Tracks within the cut-off always
     /// count.
     pub near: f64,
-    /// Widest gap between rows of the truth that is bridged, s.
+    /// Widest gap between rows of the truth that is bridged, s; or one and a half times the usual interval of its rows,
+    /// if that is wider.
     pub truth_gap: f64,
     /// How long an object is taken to stay at its first and last place before and after it is known, s.
     pub truth_hold: f64,
@@ -47,6 +54,11 @@ impl Default for EvaluateOptions {
 /// Longest gap between rows of a track that is bridged, and how long a track is held after its last row, s.
 const TRACK_GAP: f64 = 2.5;
 const TRACK_HOLD: f64 = 0.6;
+/// Rows that are usually farther apart are bridged over this many of their usual intervals.
+const BRIDGED: f64 = 1.5;
+/// Intervals between rows of tracks that show how often a tracker reports. A few rows far apart show only that it was
+/// silent in between.
+const RHYTHM: usize = 10;
 
 /// Scores at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -69,9 +81,9 @@ pub struct Instant {
     pub objects: usize,
     /// Tracks that were reported.
     pub tracks: usize,
-    /// Objects with a track of their own within the cut-off.
+    /// Objects with a track of their own closer than the cut-off.
     pub covered: usize,
-    /// Tracks farther than the cut-off from every object.
+    /// Tracks that are not closer than the cut-off to any object.
     pub false_tracks: usize,
     /// Those of them that are near an object.
     pub false_tracks_near: usize,
@@ -111,8 +123,10 @@ impl Evaluation {
 
 /// Scores tracks against the truth.
 ///
-/// Each object takes the track that it had before while that is within the cut-off, the one that held its track last first;
-/// then the nearest pairs are joined. A switch is counted when an object's track is not the one that it had last.
+/// Each object takes the track that it had before while that is closer than the cut-off, the one that held its track last
+/// first; then the nearest pairs are joined. A switch is counted when an object's track is not the one that it had last.
+///
+/// Time and memory follow the number of rows, and of pairs that are near each other.
 ///
 /// # Errors
 /// When an option is out of range or a position is not finite.
@@ -121,161 +135,118 @@ pub fn evaluate(
     truths: &Truths,
     options: &EvaluateOptions,
 ) -> Result<Evaluation, FilterError> {
-    let gospa = Gospa::new(options.cutoff, options.order)?;
-    let ospa = Ospa::new(options.cutoff, options.order)?;
-    let (objects, lines) = (timeline::of_truths(truths), timeline::of_tracks(tracks));
-    let times = options.times.clone().unwrap_or_else(|| times_of(tracks, &objects));
-    let mut holders = Holders::new(objects.len());
+    let metrics = SetMetrics::new(options)?;
+    let (truth_lines, track_lines) = (timeline::of_truths(truths), timeline::of_tracks(tracks));
+    let mut times = options
+        .times
+        .clone()
+        .unwrap_or_else(|| scored_times(tracks.rows.iter().map(|row| row.time), truths));
+    times.sort_by(f64::total_cmp);
+    let (truth_reach, track_reach) = (truth_reach(&truth_lines, options), track_reach(&track_lines));
+    let objects = Lives::of(truth_lines.values(), &times, Rule::Interpolate, truth_reach);
+    let lines = Lives::of(track_lines.values(), &times, Rule::Extrapolate, track_reach);
+    let (mut there, mut reported) = (objects.walk(), lines.walk());
+    let mut holders = Holders::new(truth_lines.len());
     let mut errors = Errors::default();
     let mut instants = Vec::with_capacity(times.len());
-    for &time in &times {
-        let picture = Picture::new(time, &objects, &lines, options);
-        let far = picture.nearest_object();
-        let within: Vec<[f64; 2]> = picture.tracks_within(options.near.max(options.cutoff));
-        let score = gospa.score(&picture.objects, &picture.tracks)?;
-        let (switches, covered) = holders.assign(&picture, options.cutoff);
-        errors.take(&picture, options.cutoff);
-        instants.push(Instant {
-            time,
-            gospa: score.total,
-            localisation: score.parts.localisation,
-            missed: score.parts.missed,
-            false_alarm: score.parts.false_alarm,
-            gospa_near: gospa.score(&picture.objects, &within)?.total,
-            ospa: ospa.score(&picture.objects, &picture.tracks)?.total,
-            objects: picture.objects.len(),
-            tracks: picture.tracks.len(),
-            covered,
-            false_tracks: far.iter().filter(|distance| **distance > options.cutoff).count(),
-            false_tracks_near: far.iter().filter(|d| **d > options.cutoff && **d <= options.near).count(),
-            switches,
-        });
+    for (step, &time) in times.iter().enumerate() {
+        let picture = Picture::new(there.at(step), reported.at(step), options.cutoff, options.near);
+        let (switches, covered) = holders.assign(&picture);
+        errors.take(&picture);
+        instants.push(Instant { time, switches, covered, ..metrics.score(&picture)? });
     }
-    let trajectories = trajectory_score(&times, &objects, &lines, options)?;
+    let trajectories = trajectory_score(times.len(), &objects, &lines, options)?;
     let means = means(&instants, &errors, trajectories);
     Ok(Evaluation { instants, means })
 }
 
-/// The times at which tracks were reported while the truth is known.
-fn times_of(tracks: &Tracks, objects: &BTreeMap<Arc<str>, Timeline>) -> Vec<f64> {
-    let mut times: Vec<f64> = tracks.rows.iter().map(|row| row.time).collect();
+/// The times to score at: those of the reports and those at which the truth is told, from the first time of the truth
+/// to the last. A time of the truth at which nobody reported a track counts, so that silence is no way to a better
+/// score. Without any truth these are the times of the reports.
+pub fn scored_times(reports: impl IntoIterator<Item = f64>, truths: &Truths) -> Vec<f64> {
+    let told = sorted(truths.rows.iter().map(|row| row.time));
+    let mut times = sorted(reports.into_iter());
+    let (Some(first), Some(last)) = (told.first(), told.last()) else { return times };
+    times.retain(|time| (first - SAME..=last + SAME).contains(time));
+    let mut times_of_truth: Vec<f64> = Vec::new();
+    for time in told {
+        let next = times.partition_point(|&report| report < time - SAME);
+        let reported = times.get(next).is_some_and(|report| report - time <= SAME);
+        if !reported && times_of_truth.last().is_none_or(|last| time - last > SAME) {
+            times_of_truth.push(time);
+        }
+    }
+    times.extend(times_of_truth);
     times.sort_by(f64::total_cmp);
-    times.dedup();
-    let first = objects.values().map(|line| line.span().0).fold(f64::INFINITY, f64::min);
-    let last = objects.values().map(|line| line.span().1).fold(f64::NEG_INFINITY, f64::max);
-    times.retain(|time| (first..=last).contains(time));
     times
 }
 
-/// Who was where at one time.
-struct Picture {
-    /// Numbers and places of the objects that were there.
-    object_ids: Vec<usize>,
-    objects: Vec<[f64; 2]>,
-    track_ids: Vec<u64>,
-    tracks: Vec<[f64; 2]>,
+/// In rising order, each once.
+fn sorted(times: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut times: Vec<f64> = times.collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
 }
 
-impl Picture {
-    fn new(
-        time: f64,
-        objects: &BTreeMap<Arc<str>, Timeline>,
-        lines: &BTreeMap<u64, Timeline>,
-        options: &EvaluateOptions,
-    ) -> Self {
-        let there = objects.values().enumerate().filter_map(|(id, line)| {
-            Some((id, line.interpolate(time, options.truth_gap, options.truth_hold)?))
-        });
-        let reported =
-            lines.iter().filter_map(|(id, line)| Some((*id, line.extrapolate(time, TRACK_GAP, TRACK_HOLD)?)));
-        let (object_ids, objects) = there.unzip();
-        let (track_ids, tracks) = reported.unzip();
-        Picture { object_ids, objects, track_ids, tracks }
-    }
-
-    fn distance(&self, object: usize, track: usize) -> f64 {
-        let (a, b) = (self.objects[object], self.tracks[track]);
-        (a[0] - b[0]).hypot(a[1] - b[1])
-    }
-
-    /// Distance of each track from the nearest object.
-    fn nearest_object(&self) -> Vec<f64> {
-        let nearest = |track| {
-            (0..self.objects.len()).map(|object| self.distance(object, track)).fold(f64::INFINITY, f64::min)
-        };
-        (0..self.tracks.len()).map(nearest).collect()
-    }
-
-    fn tracks_within(&self, near: f64) -> Vec<[f64; 2]> {
-        let distances = self.nearest_object();
-        (0..self.tracks.len())
-            .filter(|&track| distances[track] <= near)
-            .map(|track| self.tracks[track])
-            .collect()
-    }
+/// A truth that is told seldom is bridged as far as its rows usually are apart.
+fn truth_reach(lines: &BTreeMap<Arc<str>, Timeline>, options: &EvaluateOptions) -> Reach {
+    let usual = timeline::usual_interval(lines.values(), 1).unwrap_or(0.0);
+    Reach { gap: options.truth_gap.max(BRIDGED * usual), hold: options.truth_hold }
 }
 
-/// Which track each object had last.
-struct Holders {
-    last: Vec<Option<u64>>,
-    when: Vec<usize>,
-    instants: usize,
+/// Tracks that are reported seldom are bridged as far as their rows usually are apart, and held for half of that.
+fn track_reach(lines: &BTreeMap<u64, Timeline>) -> Reach {
+    let usual = timeline::usual_interval(lines.values(), RHYTHM).unwrap_or(0.0);
+    Reach { gap: TRACK_GAP.max(BRIDGED * usual), hold: TRACK_HOLD.max(0.5 * usual) }
 }
 
-impl Holders {
-    fn new(objects: usize) -> Self {
-        Holders { last: vec![None; objects], when: vec![0; objects], instants: 0 }
-    }
-
-    /// Joins objects and tracks at the next time; returns the number of switches and of joined objects.
-    fn assign(&mut self, picture: &Picture, cutoff: f64) -> (usize, usize) {
-        self.instants += 1;
-        let mut free: Vec<bool> = vec![true; picture.tracks.len()];
-        let mut joined: Vec<Option<usize>> = vec![None; picture.objects.len()];
-        let mut order: Vec<usize> = (0..picture.objects.len()).collect();
-        order.sort_by_key(|&object| std::cmp::Reverse(self.when[picture.object_ids[object]]));
-        for object in order {
-            let held = self.last[picture.object_ids[object]];
-            let track = held.and_then(|id| picture.track_ids.iter().position(|&track| track == id));
-            if let Some(track) =
-                track.filter(|&track| free[track] && picture.distance(object, track) <= cutoff)
-            {
-                joined[object] = Some(track);
-                free[track] = false;
-            }
-        }
-        while let Some((object, track)) = nearest_pair(picture, cutoff, &joined, &free) {
-            joined[object] = Some(track);
-            free[track] = false;
-        }
-        let mut switches = 0;
-        for (object, track) in
-            joined.iter().enumerate().filter_map(|(object, track)| Some((object, (*track)?)))
-        {
-            let (id, track) = (picture.object_ids[object], picture.track_ids[track]);
-            switches += usize::from(self.last[id].is_some_and(|last| last != track));
-            self.last[id] = Some(track);
-            self.when[id] = self.instants;
-        }
-        (switches, joined.iter().flatten().count())
-    }
+/// The metrics of one time.
+struct SetMetrics {
+    gospa: Gospa,
+    ospa: Ospa,
 }
 
-/// The closest object and track that are both free and within the cut-off.
-fn nearest_pair(
-    picture: &Picture,
-    cutoff: f64,
-    joined: &[Option<usize>],
-    free: &[bool],
-) -> Option<(usize, usize)> {
-    let objects = (0..joined.len()).filter(|&object| joined[object].is_none());
-    let pairs =
-        objects.flat_map(|object| (0..free.len()).filter(|&t| free[t]).map(move |track| (object, track)));
-    pairs
-        .map(|(object, track)| (picture.distance(object, track), object, track))
-        .filter(|pair| pair.0 <= cutoff)
-        .min_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))))
-        .map(|(_, object, track)| (object, track))
+impl SetMetrics {
+    fn new(options: &EvaluateOptions) -> Result<Self, FilterError> {
+        let (cutoff, order) = (options.cutoff, options.order);
+        Ok(SetMetrics { gospa: Gospa::new(cutoff, order)?, ospa: Ospa::new(cutoff, order)? })
+    }
+
+    /// All but the time and what depends on times before.
+    fn score(&self, picture: &Picture) -> Result<Instant, FilterError> {
+        let (objects, tracks) = (picture.object_ids.len(), picture.track_ids.len());
+        let score = self.gospa.score_pairs(objects, tracks, &picture.near)?;
+        let far = picture.count(Standing::Far);
+        Ok(Instant {
+            gospa: score.total,
+            localisation: score.parts.localisation,
+            missed: score.parts.missed,
+            false_alarm: score.parts.false_alarm,
+            gospa_near: if far == 0 { score.total } else { self.without_far(picture)? },
+            ospa: self.ospa.score_pairs(objects, tracks, &picture.near)?.total,
+            objects,
+            tracks,
+            false_tracks: far + picture.count(Standing::Near),
+            false_tracks_near: picture.count(Standing::Near),
+            ..Instant::default()
+        })
+    }
+
+    /// GOSPA as though the tracks far from all objects were not there.
+    fn without_far(&self, picture: &Picture) -> Result<f64, FilterError> {
+        let mut kept = 0;
+        let numbers: Vec<usize> = picture
+            .standing
+            .iter()
+            .map(|standing| {
+                kept += usize::from(*standing != Standing::Far);
+                kept.saturating_sub(1)
+            })
+            .collect();
+        let near: Vec<_> = picture.near.iter().map(|&(object, track, d)| (object, numbers[track], d)).collect();
+        Ok(self.gospa.score_pairs(picture.object_ids.len(), kept, &near)?.total)
+    }
 }
 
 /// Errors of the found objects against the nearest track.
@@ -286,51 +257,25 @@ struct Errors {
 }
 
 impl Errors {
-    fn take(&mut self, picture: &Picture, cutoff: f64) {
-        for object in 0..picture.objects.len() {
-            let distances = (0..picture.tracks.len()).map(|track| picture.distance(object, track));
-            let nearest = distances.fold(f64::INFINITY, f64::min);
-            if nearest <= cutoff {
-                self.squares += nearest * nearest;
-                self.count += 1;
-            }
+    fn take(&mut self, picture: &Picture) {
+        for distance in picture.nearest_track() {
+            self.squares += distance * distance;
+            self.count += 1;
         }
     }
 }
 
 /// Trajectory GOSPA per time, with a switch penalty of half the cut-off, and its number of switches.
 fn trajectory_score(
-    times: &[f64],
-    objects: &BTreeMap<Arc<str>, Timeline>,
-    lines: &BTreeMap<u64, Timeline>,
+    times: usize,
+    objects: &Lives,
+    lines: &Lives,
     options: &EvaluateOptions,
 ) -> Result<(f64, f64), FilterError> {
-    let truth: Vec<Trajectory<2>> = objects
-        .values()
-        .flat_map(|line| pieces(times, |time| line.interpolate(time, options.truth_gap, options.truth_hold)))
-        .collect();
-    let tracks: Vec<Trajectory<2>> = lines
-        .values()
-        .flat_map(|line| pieces(times, |time| line.extrapolate(time, TRACK_GAP, TRACK_HOLD)))
-        .collect();
     let metric = TrajectoryGospa::new(options.cutoff, options.order, 0.5 * options.cutoff)?;
-    let score = metric.score(&truth, &tracks)?;
-    Ok((score.parts.sum() / times.len() as f64, score.switches))
-}
-
-/// The unbroken pieces of a trajectory over these times.
-fn pieces(times: &[f64], at: impl Fn(f64) -> Option<[f64; 2]>) -> Vec<Trajectory<2>> {
-    let mut pieces: Vec<(usize, Vec<[f64; 2]>)> = Vec::new();
-    let mut broken = true;
-    for (step, &time) in times.iter().enumerate() {
-        match (at(time), pieces.last_mut()) {
-            (Some(position), Some(piece)) if !broken => piece.1.push(position),
-            (Some(position), _) => pieces.push((step, vec![position])),
-            (None, _) => {}
-        }
-        broken = at(time).is_none();
-    }
-    pieces.into_iter().map(|(start, positions)| Trajectory::new(start, positions)).collect()
+    let score = metric.score(&objects.pieces, &lines.pieces)?;
+    // The p-th root of the mean over the times of the p-th powers.
+    Ok((score.total / (times as f64).powf(options.order.recip()), score.switches))
 }
 
 fn means(

@@ -12,13 +12,13 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::input;
 use crate::output::{STDOUT, Target, keep_inputs, print, print_json};
-use crate::score::ScoreArguments;
+use crate::score::{ScoreArguments, common_clock};
 use crate::summary::Table;
 
 /// Score tracks against the truth.
 ///
-/// Confirmed and coasted tracks are compared with the true objects at every time of the tracks at which the truth is known.
-/// A scan that left no track at all leaves no row: name the detections with --scans, so that such scans count as well.
+/// Confirmed and coasted tracks are compared with the true objects at every time of the truth and of the tracks, from the
+/// first time of the truth to the last. Objects without a track are missed, also where nothing was reported at all.
 #[derive(Debug, Args)]
 #[command(after_long_help = AFTER)]
 pub struct EvaluateArguments {
@@ -27,7 +27,7 @@ pub struct EvaluateArguments {
     /// Truth (.csv, .parquet, .ndjson, or the truth file of an Autoferry recording).
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Detections at whose scans the tracks are scored, instead of the times of the tracks.
+    /// Detections at whose scans the tracks are scored, instead of at the times of the tracks.
     #[arg(long, value_name = "FILE")]
     scans: Option<PathBuf>,
     /// Write the scores as a table (.csv, .parquet, .ndjson; - is standard output).
@@ -58,18 +58,15 @@ impl EvaluateArguments {
         keep_inputs(self.output.as_ref().and_then(Target::file), &inputs)?;
         let tracks = read_tracks(&self.tracks, &ReadOptions::default())?;
         let truths = input::truth(&self.truth)?;
-        let times = match &self.scans {
+        let scans = match &self.scans {
             Some(path) => {
                 let detections = read_detections(path, &ReadOptions::default())?;
-                Some(detections.scans.iter().map(|scan| scan.time).collect())
+                Some(detections.scans.iter().map(|scan| scan.time).collect::<Vec<f64>>())
             }
             None => None,
         };
-        let evaluation = self.score.evaluate(&tracks, &truths, times, console)?;
-        if evaluation.instants.is_empty() {
-            return Err(Failure::input("there is no time at which both tracks and truth are known")
-                .with_help("the times of both must be seconds of the same epoch"));
-        }
+        common_clock(&tracks, &truths, scans.as_deref())?;
+        let evaluation = self.score.evaluate(&tracks, &truths, scans, console)?;
         match &self.output {
             Some(Target::File(path)) => write_metrics(path, &self.metrics(&evaluation))?,
             Some(Target::Stdout) => {

@@ -1,7 +1,7 @@
 //! The generalised optimal sub-pattern assignment metric.
 
-use super::scale::{Scale, euclidean, finite};
-use crate::association::AssignmentSolver;
+use super::near::pairs_within;
+use super::scale::{Pair, Scale, finite};
 use crate::error::FilterError;
 
 /// Measures how far a set of estimates is from the set of true objects: the errors of those found, plus a price for each
@@ -57,7 +57,8 @@ pub struct GospaScore {
     pub false_alarms: usize,
 }
 
-/// Parts of [`Gospa`], as `p`-th powers (mᵖ): [`figures`](GospaParts::figures) gives metres.
+/// Parts of [`Gospa`], as `p`-th powers (mᵖ): [`figures`](GospaParts::figures) gives metres. Where `cᵖ` is beyond the largest
+/// number a part is infinite; the total is not.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GospaParts {
     /// Errors of the objects that were found.
@@ -116,7 +117,7 @@ impl Gospa {
     ) -> Result<GospaScore, FilterError> {
         finite(truth)?;
         finite(estimates)?;
-        self.score_by(truth.len(), estimates.len(), |i, j| euclidean(&truth[i], &estimates[j]))
+        self.score_pairs(truth.len(), estimates.len(), &pairs_within(truth, estimates, self.scale.cutoff))
     }
 
     /// Compares `truth` objects with `estimates` by a distance of yours, called with the number of the object and that of
@@ -130,27 +131,37 @@ impl Gospa {
         estimates: usize,
         distance: impl Fn(usize, usize) -> f64,
     ) -> Result<GospaScore, FilterError> {
-        let highest = self.scale.highest();
-        let mut costs = Vec::with_capacity(truth * estimates);
-        for i in 0..truth {
-            for j in 0..estimates {
-                let cost = self.scale.cut(distance(i, j))?;
-                costs.push(if cost < highest { cost } else { f64::INFINITY });
-            }
-        }
-        // An object without estimate costs cᵖ/2 and leaves an estimate alone for another cᵖ/2.
-        let mut solver = AssignmentSolver::new();
-        let best = solver
-            .solve_or_miss(&costs, estimates, &vec![highest; truth])
-            .map_err(|_| FilterError::NotFinite { what: "distance to the power of the order" })?;
-        let pairs: Vec<_> = best.pairs().collect();
-        let (missed, false_alarms) = (truth - pairs.len(), estimates - pairs.len());
+        self.score_pairs(truth, estimates, &self.scale.near(truth, estimates, distance)?)
+    }
+
+    /// Compares `truth` objects with `estimates` of which only these are near each other, as (object, estimate,
+    /// distance): for large sets, where [`pairs_within`] finds the few pairs that matter. Pairs that are not named
+    /// cannot be the same.
+    ///
+    /// # Errors
+    /// When a distance is negative or not a number, or a pair is of an object or estimate that there is not.
+    pub fn score_pairs(
+        &self,
+        truth: usize,
+        estimates: usize,
+        near: &[(usize, usize, f64)],
+    ) -> Result<GospaScore, FilterError> {
+        let pairs = self.scale.join(truth, estimates, self.scale.checked(truth, estimates, near)?)?;
+        Ok(self.score_joined(truth, estimates, &pairs))
+    }
+
+    fn score_joined(&self, truth: usize, estimates: usize, joined: &[Pair]) -> GospaScore {
+        let (missed, false_alarms) = (truth - joined.len(), estimates - joined.len());
         let parts = GospaParts {
-            localisation: pairs.iter().map(|(i, j)| costs[i * estimates + j]).sum(),
-            missed: 0.5 * highest * missed as f64,
-            false_alarm: 0.5 * highest * false_alarms as f64,
+            // A sum over nothing is -0, which adding 0 makes 0.
+            localisation: joined.iter().map(|pair| self.scale.power(pair.2)).sum::<f64>() + 0.0,
+            missed: self.scale.price(0.5 * missed as f64),
+            false_alarm: self.scale.price(0.5 * false_alarms as f64),
         };
-        Ok(GospaScore { total: self.scale.root(parts.sum()), parts, pairs, missed, false_alarms })
+        let alone = (0.5 * (missed + false_alarms) as f64, self.scale.cutoff);
+        let total = self.scale.norm(joined.iter().map(|pair| (1.0, pair.2)).chain([alone]));
+        let pairs = joined.iter().map(|&(i, j, _)| (i, j)).collect();
+        GospaScore { total, parts, pairs, missed, false_alarms }
     }
 }
 

@@ -16,11 +16,12 @@
 //! says how much a large error outweighs several small ones.
 //!
 //! A score holds parts that add up: these are `p`-th powers, `p` being the order, and `total` is the `p`-th root of their
-//! sum. Averages over steps and runs are taken by accumulators that can be merged, so that runs may be scored apart.
+//! sum. A pair at the cut-off is no pair. Averages over steps and runs are taken by accumulators that can be merged, so that runs may be scored apart.
 
 mod consistency;
 mod ellipse_overlap;
 mod gospa;
+mod near;
 mod ospa;
 mod ospa2;
 mod rmse;
@@ -34,6 +35,7 @@ mod wasserstein;
 pub use consistency::{Consistency, chi_square_quantile, nees};
 pub use ellipse_overlap::intersection_over_union;
 pub use gospa::{Gospa, GospaAverage, GospaParts, GospaScore};
+pub use near::{NearIndex, pairs_within};
 pub use ospa::{Ospa, OspaParts, OspaScore};
 pub use ospa2::Ospa2;
 pub use rmse::Rmse;

@@ -1,7 +1,7 @@
 //! The optimal sub-pattern assignment metric.
 
-use super::scale::{Scale, euclidean, finite};
-use crate::association::AssignmentSolver;
+use super::near::pairs_within;
+use super::scale::{Pair, Scale, finite};
 use crate::error::FilterError;
 
 /// Measures how far a set of estimates is from the set of true objects, per object.
@@ -47,7 +47,7 @@ pub struct OspaScore {
     pub pairs: Vec<(usize, usize)>,
 }
 
-/// Parts of [`Ospa`], as `p`-th powers (mᵖ).
+/// Parts of [`Ospa`], as `p`-th powers (mᵖ). Where `cᵖ` is beyond the largest number a part is infinite; the total is not.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OspaParts {
     /// Errors of the pairs, at most the cut-off each.
@@ -90,7 +90,7 @@ impl Ospa {
     ) -> Result<OspaScore, FilterError> {
         finite(truth)?;
         finite(estimates)?;
-        self.score_by(truth.len(), estimates.len(), |i, j| euclidean(&truth[i], &estimates[j]))
+        self.score_pairs(truth.len(), estimates.len(), &pairs_within(truth, estimates, self.scale.cutoff))
     }
 
     /// Compares `truth` objects with `estimates` by a distance of yours, called with the number of the object and that of
@@ -104,21 +104,49 @@ impl Ospa {
         estimates: usize,
         distance: impl Fn(usize, usize) -> f64,
     ) -> Result<OspaScore, FilterError> {
-        let mut costs = Vec::with_capacity(truth * estimates);
-        for i in 0..truth {
-            for j in 0..estimates {
-                costs.push(self.scale.cut(distance(i, j))?);
-            }
-        }
-        let mut solver = AssignmentSolver::new();
-        let best = solver
-            .solve(&costs, truth, estimates)
-            .map_err(|_| FilterError::NotFinite { what: "distance to the power of the order" })?;
-        let share = 1.0 / truth.max(estimates).max(1) as f64;
-        let parts = OspaParts {
-            localisation: best.cost * share,
-            cardinality: self.scale.highest() * truth.abs_diff(estimates) as f64 * share,
-        };
-        Ok(OspaScore { total: self.scale.root(parts.sum()), parts, pairs: best.pairs().collect() })
+        self.score_pairs(truth, estimates, &self.scale.near(truth, estimates, distance)?)
     }
+
+    /// Compares `truth` objects with `estimates` of which only these are near each other, as (object, estimate,
+    /// distance): for large sets, where [`pairs_within`] finds the few pairs that matter. Pairs that are not named are
+    /// at the cut-off.
+    ///
+    /// # Errors
+    /// When a distance is negative or not a number, or a pair is of an object or estimate that there is not.
+    pub fn score_pairs(
+        &self,
+        truth: usize,
+        estimates: usize,
+        near: &[(usize, usize, f64)],
+    ) -> Result<OspaScore, FilterError> {
+        let pairs = self.scale.join(truth, estimates, self.scale.checked(truth, estimates, near)?)?;
+        Ok(self.score_joined(truth, estimates, &pairs))
+    }
+
+    fn score_joined(&self, truth: usize, estimates: usize, joined: &[Pair]) -> OspaScore {
+        let share = 1.0 / truth.max(estimates).max(1) as f64;
+        let (beyond, apart) = (truth.min(estimates) - joined.len(), truth.abs_diff(estimates));
+        let found: f64 = joined.iter().map(|pair| self.scale.power(pair.2)).sum();
+        let parts = OspaParts {
+            localisation: (found + self.scale.price(beyond as f64)) * share,
+            cardinality: self.scale.price(apart as f64) * share,
+        };
+        let alone = ((beyond + apart) as f64 * share, self.scale.cutoff);
+        let total = self.scale.norm(joined.iter().map(|pair| (share, pair.2)).chain([alone]));
+        OspaScore { total, parts, pairs: partners(truth, estimates, joined) }
+    }
+}
+
+/// The joined pairs, and for what is left of the smaller set anything that is left of the larger one: beyond the cut-off all
+/// are equally far.
+fn partners(truth: usize, estimates: usize, joined: &[Pair]) -> Vec<(usize, usize)> {
+    let (mut found, mut used) = (vec![false; truth], vec![false; estimates]);
+    let mut pairs: Vec<(usize, usize)> = joined.iter().map(|&(i, j, _)| (i, j)).collect();
+    for &(i, j) in &pairs {
+        (found[i], used[j]) = (true, true);
+    }
+    let (rows, columns) = ((0..truth).filter(|&i| !found[i]), (0..estimates).filter(|&j| !used[j]));
+    pairs.extend(rows.zip(columns));
+    pairs.sort_unstable();
+    pairs
 }

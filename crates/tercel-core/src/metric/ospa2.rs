@@ -78,13 +78,14 @@ impl Ospa2 {
         let (mut sum, mut count) = (0.0, 0.0);
         for step in first..last {
             sum += match (f.at(step), g.at(step)) {
-                (Some(a), Some(b)) => euclidean(a, b).min(self.cutoff),
+                (Some(a), Some(b)) => (euclidean(a, b) / self.cutoff).min(1.0),
                 (None, None) => continue,
-                _ => self.cutoff,
+                _ => 1.0,
             };
             count += 1.0;
         }
-        sum / f64::max(count, 1.0)
+        // In units of the cut-off no sum overflows.
+        sum / f64::max(count, 1.0) * self.cutoff
     }
 }
 

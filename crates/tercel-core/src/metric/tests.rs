@@ -146,6 +146,58 @@ fn a_pair_at_the_cut_off_is_one_missed_and_one_false() {
 }
 
 #[test]
+fn totals_are_right_for_orders_and_cut_offs_whose_powers_overflow_or_vanish() {
+    for (cutoff, order) in [(1000.0, 150.0), (1e-3, 150.0), (1e300, 2.0), (1e-300, 2.0), (100.0, 1e6), (1e308, 1.0)] {
+        let (gospa, ospa) = (Gospa::new(cutoff, order).unwrap(), Ospa::new(cutoff, order).unwrap());
+        let ospa2 = Ospa2::new(cutoff, order).unwrap();
+        let close = |found: f64, expected: f64| {
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} for {expected:e}, cut-off {cutoff:e}, order {order}");
+        };
+        let (here, there) = ([[0.0, 0.0]], [[1e-3 * cutoff, 0.0]]);
+        assert_eq!(gospa.score::<2>(&[], &[]).unwrap().parts.sum(), 0.0);
+        assert_eq!((gospa.score::<2>(&[], &[]).unwrap().total, ospa.score::<2>(&[], &[]).unwrap().total), (0.0, 0.0));
+        assert_eq!((gospa.score(&here, &here).unwrap().total, ospa.score(&here, &here).unwrap().total), (0.0, 0.0));
+        close(gospa.score(&here, &there).unwrap().total, 1e-3 * cutoff);
+        close(ospa.score(&here, &there).unwrap().total, 1e-3 * cutoff);
+        close(gospa.score(&here, &[]).unwrap().total, cutoff * 0.5f64.powf(order.recip()));
+        close(ospa.score(&here, &[]).unwrap().total, cutoff);
+        let track = |place: [f64; 2]| [Trajectory::new(0, [place; 3])];
+        close(ospa2.score(&track(here[0]), &track(there[0]), 0..3).unwrap().total, 1e-3 * cutoff);
+        close(ospa2.score(&track(here[0]), &[], 0..3).unwrap().total, cutoff);
+    }
+}
+
+#[test]
+fn pairs_whose_powers_vanish_are_still_the_nearest_ones() {
+    let (truth, estimates) = ([[0.0, 0.0], [6.0, 0.0], [0.0, 900.0]], [[0.0, 901.0], [5.0, 0.0], [1.0, 0.0]]);
+    let gospa = Gospa::new(1000.0, 150.0).unwrap().score(&truth, &estimates).unwrap();
+    assert_eq!(gospa.pairs, [(0, 2), (1, 1), (2, 0)]);
+    assert!((gospa.total - 3f64.powf(1.0 / 150.0)).abs() < 1e-12, "{}", gospa.total);
+    let ospa = Ospa::new(1000.0, 150.0).unwrap().score(&truth, &estimates).unwrap();
+    assert!((ospa.total - 1.0).abs() < 1e-12 && ospa.pairs == gospa.pairs, "{}", ospa.total);
+}
+
+#[test]
+fn nothing_found_is_zero_and_not_minus_zero() {
+    let score = Gospa::new(5.0, 1.0).unwrap().score(&[[0.0, 0.0]], &[[30.0, 4.0]]).unwrap();
+    assert!(score.parts.localisation.is_sign_positive() && score.parts.figures(1.0).localisation.is_sign_positive());
+}
+
+#[test]
+fn pairs_that_are_named_score_as_the_points_do_and_strangers_among_them_are_refused() {
+    let (gospa, ospa) = (Gospa::new(10.0, 2.0).unwrap(), Ospa::new(10.0, 2.0).unwrap());
+    let (truth, estimates) = ([[0.0, 0.0], [8.0, 0.0]], [[3.0, 0.0], [4.0, 0.0], [90.0, 0.0]]);
+    // Named twice, in any order, and beyond the cut-off as well.
+    let mut near = pairs_within(&truth, &estimates, 100.0);
+    near.extend(near.clone().into_iter().rev());
+    assert_eq!(gospa.score_pairs(2, 3, &near).unwrap(), gospa.score(&truth, &estimates).unwrap());
+    assert_eq!(ospa.score_pairs(2, 3, &near).unwrap(), ospa.score(&truth, &estimates).unwrap());
+    for stranger in [(2, 0, 1.0), (0, 3, 1.0), (0, 0, -1.0), (0, 0, f64::NAN)] {
+        assert!(gospa.score_pairs(2, 3, &[stranger]).is_err() && ospa.score_pairs(2, 3, &[stranger]).is_err());
+    }
+}
+
+#[test]
 fn a_distance_of_ones_own_is_used() {
     let gospa = Gospa::new(10.0, 1.0).unwrap();
     let score = gospa.score_by(2, 2, |i, j| if i == j { f64::INFINITY } else { 1.0 }).unwrap();
