@@ -13,7 +13,7 @@ use crate::names::Names;
 use crate::notice::Notice;
 use crate::reorder::{Arrival, Order, Reorder};
 use crate::sensors::Station;
-use crate::turns::Look;
+use crate::turns::{Look, Turns};
 use crate::understood;
 
 /// The tracker that a configuration describes. See the [crate] for an example.
@@ -46,12 +46,12 @@ pub struct Summary {
     pub ahead: u64,
     /// Scans of sensors that the configuration leaves out.
     pub ignored: u64,
-    /// Detections of scans that came too late.
-    pub late_detections: u64,
-    /// Detections of scans that were set aside.
-    pub ahead_detections: u64,
-    /// Detections of sensors that the configuration leaves out.
-    pub ignored_detections: u64,
+    /// Rows of scans that came too late: their detections, and scans without any.
+    pub late_rows: u64,
+    /// Rows of scans that were set aside.
+    pub ahead_rows: u64,
+    /// Rows of sensors that the configuration leaves out.
+    pub ignored_rows: u64,
     /// Detections that updated a track.
     pub updates: u64,
     /// Detections that started a tentative track.
@@ -120,6 +120,12 @@ impl Pipeline {
         std::mem::take(&mut self.notices)
     }
 
+    /// Detections that came in and wait to be tracked.
+    pub fn held(&self) -> usize {
+        let open = self.stations.values().filter_map(|station| station.turns.as_ref()).map(Turns::held);
+        open.sum::<usize>() + self.reorder.held()
+    }
+
     /// Looks ahead at a recording: at what is said of its sensors and at its first scans. Sensors of which the configuration does
     /// not say so are then taken as reports, or as antennas that turn, where the recording says or shows that. Without this call,
     /// as with a stream, they scan.
@@ -153,7 +159,7 @@ impl Pipeline {
     pub fn push(&mut self, scan: Scan) -> Result<Vec<Track>, PipelineError> {
         if self.ignore.iter().any(|name| **name == *scan.sensor) {
             self.summary.ignored += 1;
-            self.summary.ignored_detections += scan.detections.len() as u64;
+            self.summary.ignored_rows += rows(&scan);
             return Ok(Vec::new());
         }
         let time = scan.time;
@@ -202,9 +208,9 @@ impl Pipeline {
         match self.reorder.push(look) {
             Arrival::Taken => {}
             Arrival::LeftOut(notice, look) => self.leave_out(notice, &look),
-            Arrival::Restarted(notice, [scans, detections]) => {
+            Arrival::Restarted(notice, [scans, rows]) => {
                 self.summary.late -= scans;
-                self.summary.late_detections -= detections;
+                self.summary.late_rows -= rows;
                 self.notices.push(notice);
                 self.engine = engine(&self.config)?;
                 self.numbers.1 = self.numbers.0;
@@ -214,13 +220,13 @@ impl Pipeline {
     }
 
     fn leave_out(&mut self, notice: Notice, look: &Look) {
-        let detections = look.scan.detections.len() as u64;
+        let rows = rows(&look.scan);
         if let Notice::Ahead { .. } = notice {
             self.summary.ahead += 1;
-            self.summary.ahead_detections += detections;
+            self.summary.ahead_rows += rows;
         } else {
             self.summary.late += 1;
-            self.summary.late_detections += detections;
+            self.summary.late_rows += rows;
         }
         self.notices.push(notice);
     }
@@ -283,6 +289,11 @@ impl Pipeline {
             }
         }
     }
+}
+
+/// Rows of a scan in a table.
+pub(crate) fn rows(scan: &Scan) -> u64 {
+    scan.detections.len().max(1) as u64
 }
 
 /// Teaches the clutter map of a sensor with its detections, each in the measure in which no track explains it.

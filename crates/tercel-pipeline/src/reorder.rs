@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::notice::Notice;
+use crate::pipeline::rows;
 use crate::turns::Look;
 
 /// Puts scans in order: holds them back for a while, so that late ones can take their place, sets a single time far ahead aside,
@@ -41,7 +42,7 @@ pub(crate) enum Arrival {
     Taken,
     /// It, or the one before, is left out.
     LeftOut(Notice, Look),
-    /// The clock was set back, and what comes now has nothing to do with what was. So many scans and detections that were left
+    /// The clock was set back, and what comes now has nothing to do with what was. So many scans and rows that were left
     /// out before are taken in after all.
     Restarted(Notice, [u64; 2]),
 }
@@ -109,7 +110,7 @@ impl Reorder {
         let notice = Notice::set_back(&self.behind[0].scan, self.released);
         let behind = std::mem::take(&mut self.behind);
         let back = &behind[..BEHIND - 1];
-        let back = [back.len() as u64, back.iter().map(|look| look.scan.detections.len() as u64).sum()];
+        let back = [back.len() as u64, back.iter().map(|look| rows(&look.scan)).sum()];
         *self = Reorder::new(self.settings);
         behind.into_iter().for_each(|look| self.insert(look));
         Arrival::Restarted(notice, back)
@@ -135,6 +136,11 @@ impl Reorder {
         self.released = front;
         self.count += 1;
         self.waiting.pop_front()
+    }
+
+    /// Detections that wait.
+    pub fn held(&self) -> usize {
+        self.waiting.iter().chain(&self.ahead).map(|look| look.scan.detections.len()).sum()
     }
 
     /// The scan far ahead that no other one confirmed, at the end.

@@ -105,6 +105,11 @@ impl Turns {
         if over { self.finish() } else { None }
     }
 
+    /// Plots of the scan that is open.
+    pub fn held(&self) -> usize {
+        self.open.as_ref().map_or(0, |open| open.scan.detections.len())
+    }
+
     /// No scan that is still to come is older than this, s.
     pub fn oldest(&self) -> f64 {
         self.open.as_ref().map_or(f64::INFINITY, |open| open.scan.time)

@@ -137,10 +137,8 @@ pub fn evaluate(
 ) -> Result<Evaluation, FilterError> {
     let metrics = SetMetrics::new(options)?;
     let (truth_lines, track_lines) = (timeline::of_truths(truths), timeline::of_tracks(tracks));
-    let mut times = options
-        .times
-        .clone()
-        .unwrap_or_else(|| scored_times(tracks.rows.iter().map(|row| row.time), truths));
+    let mut times =
+        options.times.clone().unwrap_or_else(|| scored_times(tracks.rows.iter().map(|row| row.time), truths));
     times.sort_by(f64::total_cmp);
     let (truth_reach, track_reach) = (truth_reach(&truth_lines, options), track_reach(&track_lines));
     let objects = Lives::of(truth_lines.values(), &times, Rule::Interpolate, truth_reach);
@@ -244,7 +242,8 @@ impl SetMetrics {
                 kept.saturating_sub(1)
             })
             .collect();
-        let near: Vec<_> = picture.near.iter().map(|&(object, track, d)| (object, numbers[track], d)).collect();
+        let near: Vec<_> =
+            picture.near.iter().map(|&(object, track, d)| (object, numbers[track], d)).collect();
         Ok(self.gospa.score_pairs(picture.object_ids.len(), kept, &near)?.total)
     }
 }

@@ -112,7 +112,8 @@ impl Picture {
 
     /// The distance of an object from its nearest track, for the objects that have one closer than the cut-off.
     pub(super) fn nearest_track(&self) -> impl Iterator<Item = f64> {
-        let distance = |pairs: &[(usize, usize, f64)]| pairs.iter().map(|pair| pair.2).fold(f64::INFINITY, f64::min);
+        let distance =
+            |pairs: &[(usize, usize, f64)]| pairs.iter().map(|pair| pair.2).fold(f64::INFINITY, f64::min);
         self.near.chunk_by(|a, b| a.0 == b.0).map(distance)
     }
 }

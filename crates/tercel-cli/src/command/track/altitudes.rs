@@ -34,7 +34,9 @@ impl Altitudes {
                 numbers.push(detection.id);
             }
         }
-        self.scans.push((scan.time, numbers));
+        if !numbers.is_empty() {
+            self.scans.push((scan.time, numbers));
+        }
     }
 
     /// Gives rows the altitude that was heard last of their track.
@@ -50,13 +52,20 @@ impl Altitudes {
         }
     }
 
-    /// Forgets the scans that have led to rows: all but the newest `held`.
+    /// Forgets the detections that have led to rows: all but the newest `held`.
     pub fn forget(&mut self, held: usize) {
-        if self.scans.len() <= held {
+        if self.waiting.len() <= held {
             return;
         }
         self.scans.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (_, numbers) in self.scans.drain(..self.scans.len() - held) {
+        let mut over = self.waiting.len() - held;
+        let gone = self.scans.iter().take_while(|(_, numbers)| {
+            let fits = numbers.len() <= over;
+            over -= numbers.len().min(over);
+            fits
+        });
+        let gone = gone.count();
+        for (_, numbers) in self.scans.drain(..gone) {
             numbers.iter().for_each(|number| {
                 self.waiting.remove(number);
             });

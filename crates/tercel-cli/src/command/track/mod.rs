@@ -5,6 +5,7 @@ mod outcome;
 mod preset;
 mod rows;
 mod run;
+mod teller;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -19,6 +20,7 @@ use self::outcome::Outcome;
 use self::preset::{Chosen, Recording};
 use self::rows::Rows;
 use self::run::{Run, Wanted};
+use self::teller::Teller;
 use crate::account::Account;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -90,6 +92,9 @@ enum OnError {
     /// It is counted, a warning is printed, and the next line is read.
     Skip,
 }
+
+/// Scans of a recording that are looked at before it is tracked.
+const FIRST: usize = 20_000;
 
 const AFTER: &str = "\
 Examples:
@@ -187,14 +192,18 @@ impl TrackArguments {
             console.note("the tracks are counted only; -o FILE writes them");
         }
         let mut run = Run::new(chosen.pipeline, wanted);
-        run.begin(origin::settle(detections.origin, self.origin)?, detections.description)?;
+        let mut teller = Teller::default();
+        let first = &detections.scans[..detections.scans.len().min(FIRST)];
+        run.begin(origin::settle(detections.origin, self.origin)?, detections.description, first)?;
         let progress = Progress::bar(console, "tracking", detections.scans.len());
         for scan in detections.scans {
             run.track(scan)?.map_err(|error| self.refused(error))?;
+            teller.tell(run.notices(), console);
             progress.step();
         }
         drop(progress);
         run.end()?.map_err(|error| self.refused(error))?;
+        teller.tell(run.notices(), console);
         let (config, configuration) = (chosen.config, chosen.name);
         Ok(Outcome { run, truths, config, configuration, left_out: Account::of(left_out), bad: 0, reading })
     }
@@ -213,10 +222,12 @@ impl TrackArguments {
             }
         };
         let mut run = Run::new(chosen.pipeline, self.wanted(truths.as_ref()));
-        let mut bad = 0;
+        let (mut bad, mut teller) = (0, Teller::default());
         while let Some(scan) = next {
-            run.begin(origin::settle(scans.origin(), self.origin)?, scans.description())?;
-            match self.track_one(&mut run, scan)? {
+            run.begin(origin::settle(scans.origin(), self.origin)?, scans.description(), &[])?;
+            let tracked = self.track_one(&mut run, scan)?;
+            teller.tell(run.notices(), console);
+            match tracked {
                 Ok(()) => {}
                 Err(failure) if self.on_error == OnError::Skip => {
                     bad += 1;
@@ -228,8 +239,9 @@ impl TrackArguments {
             }
             next = scans.next();
         }
-        run.begin(origin::settle(scans.origin(), self.origin)?, scans.description())?;
+        run.begin(origin::settle(scans.origin(), self.origin)?, scans.description(), &[])?;
         run.end()?.map_err(|error| self.refused(error))?;
+        teller.tell(run.notices(), console);
         let (config, configuration) = (chosen.config, chosen.name);
         let (left_out, reading) = (Account::default(), Duration::ZERO);
         Ok(Outcome { run, truths, config, configuration, left_out, bad, reading })

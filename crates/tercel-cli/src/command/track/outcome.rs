@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use tercel_data::table::Truths;
-use tercel_pipeline::Config;
+use tercel_pipeline::{Config, Summary};
 use tercel_study::evaluate::Evaluation;
 use tercel_study::report::{self, Chart, Form, Picture, Report, SensorNote};
 
 use super::TrackArguments;
-use super::run::{Run, Untracked};
+use super::run::Run;
 use crate::account::Account;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -39,9 +39,10 @@ pub struct Outcome {
 impl Outcome {
     /// Scores the tracks, puts the outputs in their places and prints the summary.
     pub fn write(mut self, arguments: &TrackArguments, console: &Console) -> Result<(), Failure> {
-        let Untracked { late, ignored } = self.run.untracked;
-        self.left_out.add("a scan that came too late", late);
-        self.left_out.add("a sensor that the configuration ignores", ignored);
+        let Summary { late_rows, ahead_rows, ignored_rows, .. } = self.run.summary();
+        self.left_out.add("a scan that came too late", late_rows);
+        self.left_out.add("a time far ahead of all others", ahead_rows);
+        self.left_out.add("a sensor that the configuration ignores", ignored_rows);
         self.left_out.add("a line or scan that cannot be used", self.bad);
         let evaluation = match &self.truths {
             Some(truths) => {
@@ -57,13 +58,6 @@ impl Outcome {
         }
         self.run.finish(console)?;
         self.left_out.say_briefly(console);
-        let late = self.run.summary().late;
-        if late > 0 {
-            let late = counted(late, "scan");
-            console.warn(format_args!(
-                "{late} too late and left out; out_of_order = \"buffer\" in [input] sorts them in"
-            ));
-        }
         if arguments.json {
             return print_json(&self.json(arguments, evaluation));
         }
@@ -80,6 +74,9 @@ impl Outcome {
     fn figures(&self) -> Vec<(&'static str, String)> {
         let summary = self.run.summary();
         let mut scans = format!("{} tracked, {} late", count(summary.scans), count(summary.late));
+        if summary.ahead > 0 {
+            scans.push_str(&format!(", {} set aside", count(summary.ahead)));
+        }
         if summary.ignored > 0 {
             scans.push_str(&format!(", {} of ignored sensors", count(summary.ignored)));
         }
@@ -144,6 +141,7 @@ impl Outcome {
                 "read": self.run.scans,
                 "tracked": summary.scans,
                 "late": summary.late,
+                "ahead": summary.ahead,
                 "ignored": summary.ignored,
                 "bad": self.bad,
             },
@@ -152,7 +150,7 @@ impl Outcome {
                 "updated": summary.updates,
                 "started": summary.starts,
                 "clutter": summary.clutter,
-                "left_out": self.run.untracked.late + self.run.untracked.ignored,
+                "left_out": summary.late_rows + summary.ahead_rows + summary.ignored_rows,
             },
             "left_out": self.left_out.json(),
             "confirmed_tracks": summary.confirmed,

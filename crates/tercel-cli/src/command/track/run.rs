@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use tercel_data::table::{Description, Detections, Origin, Scan, Track, Tracks};
 use tercel_data::{Format, TracksWriter};
-use tercel_pipeline::{Pipeline, PipelineError, Summary};
+use tercel_pipeline::{Notice, Pipeline, PipelineError, Summary};
 
 use super::altitudes::Altitudes;
 use super::rows::{Rows, Selection};
@@ -39,18 +39,7 @@ pub struct Run {
     pub tracks: Tracks,
     /// Scans that came in.
     pub scans: u64,
-    /// Detections that came in and were not tracked.
-    pub untracked: Untracked,
     busy: Duration,
-}
-
-/// Detections that were not tracked.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Untracked {
-    /// Of scans that came too late.
-    pub late: u64,
-    /// Of sensors that the configuration leaves out.
-    pub ignored: u64,
 }
 
 impl Run {
@@ -67,16 +56,23 @@ impl Run {
             seen: Detections::default(),
             tracks: Tracks { labels, modes, ..Tracks::default() },
             scans: 0,
-            untracked: Untracked::default(),
             busy: Duration::ZERO,
         }
     }
 
     /// Opens the output, once it is known what the recording is and where its frame lies. Only the first call does something.
-    pub fn begin(&mut self, origin: Option<Origin>, recording: Description) -> Result<(), Failure> {
+    ///
+    /// `first` are the first scans of a recording that is at hand; they show what nothing says of its sensors.
+    pub fn begin(
+        &mut self,
+        origin: Option<Origin>,
+        recording: Description,
+        first: &[Scan],
+    ) -> Result<(), Failure> {
         if std::mem::replace(&mut self.begun, true) {
             return Ok(());
         }
+        self.pipeline.expect(&recording, first)?;
         let rows = self.wanted.rows.unwrap_or_else(|| Rows::of(&recording));
         self.selection = Selection::new(rows, self.wanted.all);
         self.altitudes = Altitudes::new(origin);
@@ -107,19 +103,13 @@ impl Run {
     }
 
     fn push(&mut self, scan: Scan) -> Result<Vec<Track>, PipelineError> {
-        let detections = scan.detections.len() as u64;
         let copy = self.wanted.keep.then(|| scan.clone());
         self.altitudes.hear(&scan);
         let before = self.pipeline.summary();
         let rows = self.pipeline.push(scan)?;
         let after = self.pipeline.summary();
         self.scans += 1;
-        // A scan without detections is a row of the table as well.
-        if after.late > before.late {
-            self.untracked.late += detections.max(1);
-        } else if after.ignored > before.ignored {
-            self.untracked.ignored += detections.max(1);
-        } else {
+        if (after.late, after.ahead, after.ignored) == (before.late, before.ahead, before.ignored) {
             self.seen.scans.extend(copy);
         }
         Ok(rows)
@@ -128,8 +118,7 @@ impl Run {
     /// Writes those of the rows that are wanted.
     fn hand_on(&mut self, mut rows: Vec<Track>) -> Result<(), Failure> {
         self.altitudes.give(&mut rows);
-        let Summary { scans, late, ignored, .. } = self.pipeline.summary();
-        self.altitudes.forget(self.scans.saturating_sub(scans + late + ignored) as usize);
+        self.altitudes.forget(self.pipeline.held());
         let mut written = Vec::with_capacity(rows.len());
         for row in rows {
             if !self.selection.believes(&row) {
@@ -166,6 +155,11 @@ impl Run {
         let Some(writer) = self.writer.take() else { return Ok(()) };
         writer.notes().iter().for_each(|note| console.note(note));
         Ok(writer.finish()?)
+    }
+
+    /// What the user should be told since the last call.
+    pub fn notices(&mut self) -> Vec<Notice> {
+        self.pipeline.notices()
     }
 
     /// What happened to the scans.
