@@ -38,7 +38,7 @@ impl Target {
         match (MapFormat::of(Path::new(text)), Target::parse(text)) {
             (Some(_), _) => Ok(Target::File(PathBuf::from(text))),
             (None, Err(_)) => {
-                Err("the name must end in .csv, .parquet, .ndjson, .geojson, .kml or .gpx, or be - \
+                Err("the name must end in .csv, .parquet, .ndjson, .geojson, .kml, .kmz or .gpx, or be - \
                                    for standard output"
                     .to_owned())
             }

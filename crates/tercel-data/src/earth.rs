@@ -64,7 +64,7 @@ impl Navigator {
         let pair = |at: Option<[usize; 2]>| at.and_then(|[a, b]| number(a).zip(number(b)));
         let velocity = pair(self.velocity).map(|(x, y)| (x, y, self.climb.and_then(number)));
         let Some((frame, (x, y))) = self.frame.as_ref().zip(pair(self.place)) else {
-            let motion = velocity.map(|(x, y, _)| motion(x, y));
+            let motion = velocity.and_then(|(x, y, _)| motion(x, y));
             return Fix {
                 speed: motion.map(|(speed, _)| speed),
                 course: motion.and_then(|(_, course)| course),
@@ -150,14 +150,15 @@ fn over_ground(
         let up = turned(vector![0.0, 0.0, 1.0]);
         velocity -= up * (velocity.z / up.z);
     }
-    Some(motion(velocity.x, velocity.y))
+    motion(velocity.x, velocity.y)
 }
 
-/// Speed, and course in degrees where there is one.
-fn motion(east: f64, north: f64) -> (f64, Option<f64>) {
+/// Speed, and course in degrees where there is one; nothing for numbers too large for a speed.
+fn motion(east: f64, north: f64) -> Option<(f64, Option<f64>)> {
     let speed = east.hypot(north);
     let course = east.atan2(north).to_degrees().rem_euclid(360.0);
-    (speed, (speed > 0.0).then_some(if course < 360.0 { course } else { 0.0 }))
+    let course = (speed > 0.0).then_some(if course < 360.0 { course } else { 0.0 });
+    speed.is_finite().then_some((speed, course))
 }
 
 #[cfg(test)]
@@ -236,6 +237,7 @@ mod tests {
         }
         let rest = plane.fix(&row(&[1.0, 1.0, 0.0, 0.0], None));
         assert_eq!((rest.speed, rest.course), (Some(0.0), None), "what rests has no course");
+        assert_eq!(plane.fix(&row(&[1.0, 1.0, 1.5e308, 1.5e308], None)), Fix::default());
     }
 
     #[test]

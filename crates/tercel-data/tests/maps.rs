@@ -3,6 +3,7 @@
 // The exception for tests covers only the test functions themselves, not their helpers.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use std::io::Read;
 use std::path::Path;
 
 use serde_json::Value;
@@ -171,6 +172,27 @@ fn kml_has_a_track_in_time() {
     assert_eq!(texts(&kml, "when")[2], "2024-03-05T12:02:00Z");
     assert_eq!(texts(&kml, "coord")[1], "8.0000000 0.0000000 0.00");
     assert_eq!(texts(&kml, "altitudeMode"), ["clampToGround"]);
+}
+
+#[test]
+fn kmz_is_an_archive_of_the_same_kml() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tracks.kmz");
+    let table = ship(8.0, NOON);
+    write_tracks(&path, &table).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    // The local header has 30 bytes and the name; the directory begins where the end of the archive says.
+    let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let end = bytes.len() - 22;
+    assert_eq!((&bytes[..4], &bytes[end..end + 4]), (&b"PK\x03\x04"[..], &b"PK\x05\x06"[..]));
+    let (size, directory) = (number(end + 12), number(end + 16));
+    assert_eq!((directory + size, &bytes[directory..directory + 4]), (end, &b"PK\x01\x02"[..]));
+    assert_eq!(&bytes[30..37], b"doc.kml");
+    assert_eq!(number(18), directory - 37, "what is packed lies between the headers");
+    let mut text = String::new();
+    flate2::read::DeflateDecoder::new(&bytes[37..directory]).read_to_string(&mut text).unwrap();
+    assert_eq!(text, written(&table, "tracks.kml"));
+    assert_eq!(number(22), text.len());
 }
 
 #[test]

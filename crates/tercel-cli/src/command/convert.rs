@@ -32,7 +32,7 @@ pub struct ConvertArguments {
     #[arg(required = true)]
     input: Vec<PathBuf>,
     /// Table of detections to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON), or map of tracks (.geojson,
-    /// .kml, .gpx).
+    /// .kml, .kmz, .gpx).
     #[arg(long, short, value_name = "FILE", default_value = "-", value_parser = Target::parse_tracks)]
     output: Target,
     /// Table of the truth to write (.csv, .parquet, .ndjson).

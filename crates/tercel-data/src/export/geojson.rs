@@ -2,6 +2,7 @@
 
 use std::io::{Result, Write};
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{Clock, Path};
@@ -19,31 +20,52 @@ pub(super) fn write(sink: &mut dyn Write, paths: &[Path], clock: Clock) -> Resul
     sink.write_all(b"\n]}\n")
 }
 
-fn feature(path: &Path, clock: Clock) -> Value {
-    let time = |point: &Point| match clock.date(point.time) {
-        Some(date) => json!(date),
-        None => json!(point.time),
-    };
+/// One track.
+#[derive(Serialize)]
+struct Feature<'a> {
+    r#type: &'static str,
+    properties: Properties<'a>,
+    geometry: Value,
+}
+
+/// What programs show in a table, in this order.
+#[derive(Serialize)]
+struct Properties<'a> {
+    name: String,
+    track: u64,
+    identity: Option<&'a str>,
+    status: &'static str,
+    begin: Option<Value>,
+    end: Option<Value>,
+    points: usize,
+    altitude: Option<f64>,
+    speed: Option<f64>,
+    course: Option<f64>,
+    times: Vec<Value>,
+}
+
+fn feature(path: &Path, clock: Clock) -> Feature<'_> {
+    let time = |point: &Point| clock.date(point.time).map_or_else(|| json!(point.time), |date| json!(date));
     let parts = path.parts(true);
     let points = path.points();
     let last = points.last();
-    json!({
-        "type": "Feature",
-        "geometry": geometry(&parts, path.is_in_space()),
-        "properties": {
-            "name": path.name(),
-            "track": path.track,
-            "identity": path.identity.as_deref(),
-            "status": path.status.name(),
-            "begin": points.first().map(time),
-            "end": last.map(time),
-            "points": points.len(),
-            "altitude": last.and_then(|point| point.altitude).map(|metres| rounded(metres, 2)),
-            "speed": last.and_then(|point| point.speed).map(|speed| rounded(speed, 3)),
-            "course": last.and_then(|point| point.course).map(|course| rounded(course, 2)),
-            "times": parts.iter().flatten().map(time).collect::<Vec<_>>(),
-        },
-    })
+    let number = |value: fn(&Point) -> Option<f64>, decimals| {
+        last.and_then(value).map(|number| rounded(number, decimals))
+    };
+    let properties = Properties {
+        name: path.name(),
+        track: path.track,
+        identity: path.identity.as_deref(),
+        status: path.status.name(),
+        begin: points.first().map(time),
+        end: last.map(time),
+        points: points.len(),
+        altitude: number(|point| point.altitude, 2),
+        speed: number(|point| point.speed, 3),
+        course: number(|point| point.course, 2),
+        times: parts.iter().flatten().map(time).collect(),
+    };
+    Feature { r#type: "Feature", properties, geometry: geometry(&parts, path.is_in_space()) }
 }
 
 fn geometry(parts: &[Vec<Point>], in_space: bool) -> Value {

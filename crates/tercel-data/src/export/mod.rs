@@ -4,6 +4,7 @@ mod clock;
 mod geojson;
 mod gpx;
 mod kml;
+mod kmz;
 mod path;
 
 use std::path::Path as FilePath;
@@ -28,17 +29,20 @@ pub enum MapFormat {
     GeoJson,
     /// Keyhole Markup Language 2.2: a `gx:Track` with its times.
     Kml,
+    /// The same in a compressed archive.
+    Kmz,
     /// GPS Exchange Format 1.1: a `trk`.
     Gpx,
 }
 
 impl MapFormat {
-    /// The format that the name of a file tells: `.geojson`, `.kml` or `.gpx`.
+    /// The format that the name of a file tells: `.geojson`, `.kml`, `.kmz` or `.gpx`.
     pub fn of(path: &FilePath) -> Option<MapFormat> {
         let extension = path.extension()?.to_string_lossy().to_lowercase();
         match extension.as_str() {
             "geojson" => Some(MapFormat::GeoJson),
             "kml" => Some(MapFormat::Kml),
+            "kmz" => Some(MapFormat::Kmz),
             "gpx" => Some(MapFormat::Gpx),
             _ => None,
         }
@@ -79,7 +83,7 @@ impl MapWriter {
         if self.paths.clock() == Clock::Seconds {
             let without = match self.format {
                 MapFormat::GeoJson => "are seconds on the map, too",
-                MapFormat::Kml | MapFormat::Gpx => "are left out",
+                MapFormat::Kml | MapFormat::Kmz | MapFormat::Gpx => "are left out",
             };
             notes.push(format!("{}: the times are no Unix times and {without}", self.name));
         }
@@ -92,6 +96,7 @@ impl MapWriter {
         let written = match self.format {
             MapFormat::GeoJson => geojson::write(&mut self.file, paths, clock),
             MapFormat::Kml => kml::write(&mut self.file, paths, clock),
+            MapFormat::Kmz => kmz::write(&mut self.file, paths, clock),
             MapFormat::Gpx => gpx::write(&mut self.file, paths, clock),
         };
         written.map_err(|error| DataError::io(&self.name, "write", error))?;

@@ -14,7 +14,7 @@ use crate::error::{DataError, Refusal};
 use crate::format::Format;
 use crate::options::ReadOptions;
 use crate::read::read_as;
-use crate::table::{Detections, Origin, Truths};
+use crate::table::{Description, Detections, Origin, Truths};
 
 /// Where a recording comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -160,7 +160,7 @@ fn import_one(source: Source, path: &Path, options: &ImportOptions) -> Result<Im
 }
 
 /// Appends a recording to another; detections are numbered anew, since two files may use the same numbers.
-fn join(mut whole: Imported, part: Imported, path: &Path) -> Result<Imported, DataError> {
+fn join(mut whole: Imported, mut part: Imported, path: &Path) -> Result<Imported, DataError> {
     if whole.detections.origin != part.detections.origin {
         return Err(DataError::Metadata {
             file: crate::format::file_name(path),
@@ -168,8 +168,11 @@ fn join(mut whole: Imported, part: Imported, path: &Path) -> Result<Imported, Da
             help: "bring in the files one by one".to_owned(),
         });
     }
-    whole.detections.description =
-        std::mem::take(&mut whole.detections.description).joined(part.detections.description);
+    // A file without scans says nothing of the others.
+    let parts = [&mut whole.detections, &mut part.detections];
+    let described = parts.into_iter().filter(|part| !part.scans.is_empty());
+    let described = described.map(|part| std::mem::take(&mut part.description));
+    whole.detections.description = described.reduce(Description::joined).unwrap_or_default();
     whole.detections.scans.extend(part.detections.scans);
     whole.detections.scans.sort_by(|a, b| a.time.total_cmp(&b.time));
     let detections = whole.detections.scans.iter_mut().flat_map(|scan| &mut scan.detections);

@@ -158,3 +158,27 @@ pub struct Noise {
     /// Of the range rate, m/s.
     pub range_rate: Option<f64>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(source: &str, sensors: &[(&str, bool, Option<f64>)]) -> Description {
+        let sensors = sensors.iter().map(|(name, reports, interval)| {
+            let sensor = SensorDescription { reports: *reports, identity: true, interval: *interval };
+            ((*name).to_owned(), sensor)
+        });
+        Description { source: Some(source.to_owned()), sensors: sensors.collect() }
+    }
+
+    #[test]
+    fn of_joined_recordings_what_holds_for_both_is_known() {
+        let (monday, tuesday) =
+            (recording("ais", &[("ais", true, Some(10.0))]), recording("ais", &[("ais", true, Some(8.0))]));
+        assert_eq!(monday.clone().joined(tuesday), recording("ais", &[("ais", true, Some(8.0))]));
+        let both = monday.clone().joined(recording("autoferry", &[("radar", false, None)]));
+        assert_eq!((both.source.as_deref(), both.sensors.len(), both.all_report()), (None, 2, false));
+        let doubtful = monday.clone().joined(recording("ais", &[("ais", false, None)]));
+        assert!(!doubtful.all_report() && monday.all_report() && !Description::default().all_report());
+    }
+}

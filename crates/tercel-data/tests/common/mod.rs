@@ -7,8 +7,8 @@ use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 use tercel_data::table::{
-    Description, Detection, Detections, Metric, Metrics, Noise, Observation, Origin, Scan, Status, Track,
-    Tracks, Truth, Truths,
+    Description, Detection, Detections, Metric, Metrics, Noise, Observation, Origin, Scan, SensorDescription,
+    Status, Track, Tracks, Truth, Truths,
 };
 
 /// Any finite number, subnormal ones and both zeros included.
@@ -70,11 +70,21 @@ fn scan() -> impl Strategy<Value = Scan> {
     )
 }
 
+fn description() -> impl Strategy<Value = Description> {
+    let sensor = (any::<bool>(), any::<bool>(), option::of(positive()))
+        .prop_map(|(reports, identity, interval)| SensorDescription { reports, identity, interval });
+    let sensors = proptest::collection::btree_map(name().prop_map(|name| name.to_string()), sensor, 0..3);
+    let source = option::of(name().prop_map(|name| name.to_string()));
+    (source, sensors).prop_map(|(source, sensors)| Description { source, sensors })
+}
+
 pub fn detections() -> impl Strategy<Value = Detections> {
-    (origin(), vec(scan(), 0..6), any::<u32>(), 1..1000_u64).prop_map(|(origin, mut scans, first, step)| {
+    let head = (origin(), description());
+    (head, vec(scan(), 0..6), any::<u32>(), 1..1000_u64).prop_map(|(head, mut scans, first, step)| {
+        let (origin, description) = head;
         let detections = scans.iter_mut().flat_map(|scan| &mut scan.detections);
         detections.enumerate().for_each(|(i, detection)| detection.id = u64::from(first) + i as u64 * step);
-        Detections { origin, scans, description: Description::default() }
+        Detections { origin, scans, description }
     })
 }
 

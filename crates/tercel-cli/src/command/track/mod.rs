@@ -56,7 +56,7 @@ pub struct TrackArguments {
     truth: Option<PathBuf>,
     #[command(flatten)]
     read: ReadArguments,
-    /// Table of tracks to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON), or map (.geojson, .kml, .gpx).
+    /// Table of tracks to write (.csv, .parquet, .ndjson; - is standard output, as NDJSON), or map (.geojson, .kml, .kmz, .gpx).
     #[arg(long, short, value_name = "FILE", value_parser = Target::parse_tracks)]
     output: Option<Target>,
     /// Rows to write of a track: `updates`, when a detection updated it; `scans`, after every scan; a number, at most one in so

@@ -155,6 +155,7 @@ impl Outcome {
             "left_out": self.left_out.json(),
             "confirmed_tracks": summary.confirmed,
             "seconds": self.seconds(),
+            "reading_seconds": self.reading.as_secs_f64(),
             "scans_per_second": self.speed(),
             "scores": evaluation.map(|evaluation| arguments.score.json(evaluation)),
             "outputs": {
