@@ -137,10 +137,8 @@ pub fn evaluate(
 ) -> Result<Evaluation, FilterError> {
     let metrics = SetMetrics::new(options)?;
     let (truth_lines, track_lines) = (timeline::of_truths(truths), timeline::of_tracks(tracks));
-    let mut times = options
-        .times
-        .clone()
-        .unwrap_or_else(|| scored_times(tracks.rows.iter().map(|row| row.time), truths));
+    let mut times =
+        options.times.clone().unwrap_or_else(|| scored_times(tracks.rows.iter().map(|row| row.time), truths));
     times.sort_by(f64::total_cmp);
     let (truth_reach, track_reach) = (truth_reach(&truth_lines, options), track_reach(&track_lines));
     let objects = Lives::of(truth_lines.values(), &times, Rule::Interpolate, truth_reach);
@@ -150,7 +148,8 @@ pub fn evaluate(
     let mut errors = Errors::default();
     let mut instants = Vec::with_capacity(times.len());
     for (step, &time) in times.iter().enumerate() {
-        let picture = Picture::new(there.at(step), reported.at(step), options.cutoff, options.near);
+        let (there, here) = (objects.at(&mut there, step), lines.at(&mut reported, step));
+        let picture = Picture::new(there, here, options.cutoff, options.near);
         let (switches, covered) = holders.assign(&picture);
         errors.take(&picture);
         instants.push(Instant { time, switches, covered, ..metrics.score(&picture)? });
@@ -244,7 +243,8 @@ impl SetMetrics {
                 kept.saturating_sub(1)
             })
             .collect();
-        let near: Vec<_> = picture.near.iter().map(|&(object, track, d)| (object, numbers[track], d)).collect();
+        let near: Vec<_> =
+            picture.near.iter().map(|&(object, track, d)| (object, numbers[track], d)).collect();
         Ok(self.gospa.score_pairs(picture.object_ids.len(), kept, &near)?.total)
     }
 }

@@ -99,7 +99,9 @@ impl Timeline {
         let start = times.partition_point(|&time| time < first - hold);
         let mut pieces: Vec<Trajectory<2>> = Vec::new();
         let mut broken = true;
-        for (step, &time) in times.iter().enumerate().skip(start).take_while(|(_, time)| **time <= last + hold) {
+        for (step, &time) in
+            times.iter().enumerate().skip(start).take_while(|(_, time)| **time <= last + hold)
+        {
             let place = match rule {
                 Rule::Interpolate => self.interpolate(time, reach),
                 Rule::Extrapolate => self.extrapolate(time, reach),

@@ -58,11 +58,7 @@ impl<'a, const D: usize> NearIndex<'a, D> {
 /// let pairs = pairs_within(&[[0.0, 0.0], [90.0, 0.0]], &[[3.0, 4.0], [91.0, 0.0], [500.0, 0.0]], 20.0);
 /// assert_eq!(pairs, [(0, 0, 5.0), (1, 1, 1.0)]);
 /// ```
-pub fn pairs_within<const D: usize>(
-    a: &[[f64; D]],
-    b: &[[f64; D]],
-    limit: f64,
-) -> Vec<(usize, usize, f64)> {
+pub fn pairs_within<const D: usize>(a: &[[f64; D]], b: &[[f64; D]], limit: f64) -> Vec<(usize, usize, f64)> {
     let index = NearIndex::new(b);
     let mut pairs = Vec::new();
     for (i, place) in a.iter().enumerate() {

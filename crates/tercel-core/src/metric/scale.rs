@@ -132,12 +132,7 @@ impl Scale {
     /// least; by row. Only pairs of `near` can be joined, and only closer than the cut-off.
     ///
     /// The same pairs are the best for GOSPA and for OSPA, whose sums differ by what is the same for all joins.
-    pub(super) fn join(
-        &self,
-        rows: usize,
-        columns: usize,
-        near: &[Pair],
-    ) -> Result<Vec<Pair>, FilterError> {
+    pub(super) fn join(&self, rows: usize, columns: usize, near: &[Pair]) -> Result<Vec<Pair>, FilterError> {
         let mut solver = AssignmentSolver::new();
         let mut unit = self.cutoff;
         let mut miss = 1.0;

@@ -147,16 +147,27 @@ fn a_pair_at_the_cut_off_is_one_missed_and_one_false() {
 
 #[test]
 fn totals_are_right_for_orders_and_cut_offs_whose_powers_overflow_or_vanish() {
-    for (cutoff, order) in [(1000.0, 150.0), (1e-3, 150.0), (1e300, 2.0), (1e-300, 2.0), (100.0, 1e6), (1e308, 1.0)] {
+    for (cutoff, order) in
+        [(1000.0, 150.0), (1e-3, 150.0), (1e300, 2.0), (1e-300, 2.0), (100.0, 1e6), (1e308, 1.0)]
+    {
         let (gospa, ospa) = (Gospa::new(cutoff, order).unwrap(), Ospa::new(cutoff, order).unwrap());
         let ospa2 = Ospa2::new(cutoff, order).unwrap();
         let close = |found: f64, expected: f64| {
-            assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} for {expected:e}, cut-off {cutoff:e}, order {order}");
+            assert!(
+                (found / expected - 1.0).abs() < 1e-12,
+                "{found:e} for {expected:e}, cut-off {cutoff:e}, order {order}"
+            );
         };
         let (here, there) = ([[0.0, 0.0]], [[1e-3 * cutoff, 0.0]]);
         assert_eq!(gospa.score::<2>(&[], &[]).unwrap().parts.sum(), 0.0);
-        assert_eq!((gospa.score::<2>(&[], &[]).unwrap().total, ospa.score::<2>(&[], &[]).unwrap().total), (0.0, 0.0));
-        assert_eq!((gospa.score(&here, &here).unwrap().total, ospa.score(&here, &here).unwrap().total), (0.0, 0.0));
+        assert_eq!(
+            (gospa.score::<2>(&[], &[]).unwrap().total, ospa.score::<2>(&[], &[]).unwrap().total),
+            (0.0, 0.0)
+        );
+        assert_eq!(
+            (gospa.score(&here, &here).unwrap().total, ospa.score(&here, &here).unwrap().total),
+            (0.0, 0.0)
+        );
         close(gospa.score(&here, &there).unwrap().total, 1e-3 * cutoff);
         close(ospa.score(&here, &there).unwrap().total, 1e-3 * cutoff);
         close(gospa.score(&here, &[]).unwrap().total, cutoff * 0.5f64.powf(order.recip()));
@@ -180,7 +191,10 @@ fn pairs_whose_powers_vanish_are_still_the_nearest_ones() {
 #[test]
 fn nothing_found_is_zero_and_not_minus_zero() {
     let score = Gospa::new(5.0, 1.0).unwrap().score(&[[0.0, 0.0]], &[[30.0, 4.0]]).unwrap();
-    assert!(score.parts.localisation.is_sign_positive() && score.parts.figures(1.0).localisation.is_sign_positive());
+    assert!(
+        score.parts.localisation.is_sign_positive()
+            && score.parts.figures(1.0).localisation.is_sign_positive()
+    );
 }
 
 #[test]
@@ -193,7 +207,9 @@ fn pairs_that_are_named_score_as_the_points_do_and_strangers_among_them_are_refu
     assert_eq!(gospa.score_pairs(2, 3, &near).unwrap(), gospa.score(&truth, &estimates).unwrap());
     assert_eq!(ospa.score_pairs(2, 3, &near).unwrap(), ospa.score(&truth, &estimates).unwrap());
     for stranger in [(2, 0, 1.0), (0, 3, 1.0), (0, 0, -1.0), (0, 0, f64::NAN)] {
-        assert!(gospa.score_pairs(2, 3, &[stranger]).is_err() && ospa.score_pairs(2, 3, &[stranger]).is_err());
+        assert!(
+            gospa.score_pairs(2, 3, &[stranger]).is_err() && ospa.score_pairs(2, 3, &[stranger]).is_err()
+        );
     }
 }
 

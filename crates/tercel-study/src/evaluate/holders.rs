@@ -40,7 +40,8 @@ impl Holders {
         for object in order {
             let held = self.last[picture.object_ids[object]];
             let track = held.and_then(|id| picture.track_ids.binary_search(&id).ok());
-            let near = |track: usize| picture.near.binary_search_by_key(&(object, track), |pair| (pair.0, pair.1));
+            let near =
+                |track: usize| picture.near.binary_search_by_key(&(object, track), |pair| (pair.0, pair.1));
             if let Some(track) = track.filter(|&track| free[track] && near(track).is_ok()) {
                 joined[object] = Some(track);
                 free[track] = false;

@@ -62,7 +62,9 @@ fn assert_mean(evaluation: &Evaluation, name: &str, expected: f64) {
 fn no_track_at_all_is_everything_missed() {
     let evaluation = score(vec![], east(seconds(1, 5)));
     assert_eq!(evaluation.instants.len(), 5);
-    for (name, expected) in [("covered", 0.0), ("gospa", 10.0), ("ospa", 20.0), ("tgospa", 10.0), ("false_tracks", 0.0)] {
+    for (name, expected) in
+        [("covered", 0.0), ("gospa", 10.0), ("ospa", 20.0), ("tgospa", 10.0), ("false_tracks", 0.0)]
+    {
         assert_mean(&evaluation, name, expected);
     }
     assert!(evaluation.mean("gospa_localisation").unwrap().is_sign_positive());
@@ -78,7 +80,9 @@ fn times_of_the_truth_without_a_track_are_missed() {
 #[test]
 fn no_truth_at_all_is_everything_false() {
     let evaluation = score(follow(seconds(1, 4), 0.0), vec![]);
-    for (name, expected) in [("covered", f64::NAN), ("gospa", 10.0), ("false_tracks", 1.0), ("gospa_near", 0.0)] {
+    for (name, expected) in
+        [("covered", f64::NAN), ("gospa", 10.0), ("false_tracks", 1.0), ("gospa_near", 0.0)]
+    {
         assert_mean(&evaluation, name, expected);
     }
 }
@@ -86,8 +90,12 @@ fn no_truth_at_all_is_everything_false() {
 #[test]
 fn a_tracker_that_says_less_does_not_score_better() {
     let all = score(follow(seconds(0, 30), 3.0), east(seconds(0, 30)));
-    let ends: [Vec<f64>; 4] =
-        [seconds(0, 12).collect(), seconds(20, 30).collect(), vec![4.0, 29.0], seconds(0, 5).chain(seconds(25, 30)).collect()];
+    let ends: [Vec<f64>; 4] = [
+        seconds(0, 12).collect(),
+        seconds(20, 30).collect(),
+        vec![4.0, 29.0],
+        seconds(0, 5).chain(seconds(25, 30)).collect(),
+    ];
     for times in ends {
         let less = score(follow(times, 3.0), east(seconds(0, 30)));
         assert!(less.mean("covered") < all.mean("covered") && less.mean("gospa") > all.mean("gospa"));
@@ -115,7 +123,8 @@ fn truth_told_more_often_or_less_often_than_tracks_are_reported_changes_nothing_
 #[test]
 fn an_object_counts_only_while_it_lives_and_times_beyond_the_truth_do_not() {
     let other = seconds(3, 4).map(|time| (time, 1, [500.0, 500.0]));
-    let evaluation = score(follow(seconds(0, 9), 0.0), east(seconds(1, 6)).into_iter().chain(other).collect());
+    let evaluation =
+        score(follow(seconds(0, 9), 0.0), east(seconds(1, 6)).into_iter().chain(other).collect());
     let objects: Vec<usize> = evaluation.instants.iter().map(|instant| instant.objects).collect();
     assert_eq!(objects, [1, 1, 2, 2, 1, 1]);
 }
@@ -168,7 +177,8 @@ impl Plain {
         let far: Vec<f64> = (0..tracks.len()).map(nearest).collect();
         let gospa = Gospa::new(c, self.options.order).unwrap();
         let ospa = Ospa::new(c, self.options.order).unwrap();
-        let near: Vec<usize> = (0..tracks.len()).filter(|&j| far[j] < c || far[j] <= self.options.near).collect();
+        let near: Vec<usize> =
+            (0..tracks.len()).filter(|&j| far[j] < c || far[j] <= self.options.near).collect();
         let score = gospa.score_by(objects.len(), tracks.len(), apart).unwrap();
         let (switches, covered) = self.joined(step, objects, tracks, &apart);
         let found = (0..objects.len())
@@ -202,9 +212,9 @@ impl Plain {
             joined[i] = held.filter(|&j| !joined.contains(&Some(j)) && apart(i, j) < self.options.cutoff);
         }
         loop {
-            let open = (0..objects.len()).filter(|&i| joined[i].is_none()).flat_map(|i| {
-                (0..tracks.len()).filter(|&j| !joined.contains(&Some(j))).map(move |j| (i, j))
-            });
+            let open = (0..objects.len())
+                .filter(|&i| joined[i].is_none())
+                .flat_map(|i| (0..tracks.len()).filter(|&j| !joined.contains(&Some(j))).map(move |j| (i, j)));
             let best = open.min_by(|a, b| apart(a.0, a.1).total_cmp(&apart(b.0, b.1)).then(a.cmp(b)));
             match best.filter(|&(i, j)| apart(i, j) < self.options.cutoff) {
                 Some((i, j)) => joined[i] = Some(j),
