@@ -98,15 +98,17 @@ impl Making {
             ship.track = self.next_track;
         }
         if ship.age > 2 {
-            let mut error = || 3.0 * StandardNormal.sample(&mut self.random) as f64;
-            let state = vec![ship.place[0] + error(), ship.place[1] + error()];
+            let state = ship.place.map(|place| {
+                let error: f64 = StandardNormal.sample(&mut self.random);
+                place + 3.0 * error
+            });
             self.tracks.rows.push(Track {
                 time,
                 sensor: "radar".into(),
                 track: ship.track,
                 status: Status::Confirmed,
                 existence: 1.0,
-                state,
+                state: state.to_vec(),
                 covariance: Vec::new(),
                 modes: Vec::new(),
                 extent: None,
