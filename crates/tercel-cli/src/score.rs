@@ -13,7 +13,7 @@ use crate::progress::Progress;
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Scoring")]
 pub struct ScoreArguments {
-    /// Distance in m from which on a track has nothing to do with an object.
+    /// Distance in m beyond which a track has nothing to do with an object.
     #[arg(long, default_value_t = 20.0, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     pub cutoff: f64,
     /// Order of GOSPA and OSPA, 1 or more.

@@ -108,10 +108,9 @@ fn evaluate_gives_the_scores_of_track() {
     assert_eq!(tracked["scores"], evaluated["scores"]);
     let table = std::fs::read_to_string(&metrics).unwrap();
     assert!(table.contains("evaluate,tracks,truth,gospa,"), "{table}");
-    // Without the scans, the one that no track was reported at does not count.
+    // The scan that no track was reported at is a time of the truth, and counts without the scans as well.
     let alone = run(["evaluate", text(&tracks), "--truth", "truth.csv", "--json"]).succeeded().json();
-    assert_eq!(alone["scores"]["times"], 5);
-    assert_eq!(alone["scores"]["metrics"]["covered"], 1.0);
+    assert_eq!(alone["scores"], evaluated["scores"]);
 }
 
 #[test]

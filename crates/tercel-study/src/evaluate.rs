@@ -148,7 +148,8 @@ pub fn evaluate(
     let mut errors = Errors::default();
     let mut instants = Vec::with_capacity(times.len());
     for (step, &time) in times.iter().enumerate() {
-        let picture = Picture::new(there.at(step), reported.at(step), options.cutoff, options.near);
+        let (there, here) = (objects.at(&mut there, step), lines.at(&mut reported, step));
+        let picture = Picture::new(there, here, options.cutoff, options.near);
         let (switches, covered) = holders.assign(&picture);
         errors.take(&picture);
         instants.push(Instant { time, switches, covered, ..metrics.score(&picture)? });

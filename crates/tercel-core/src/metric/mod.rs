@@ -39,6 +39,6 @@ pub use near::{NearIndex, pairs_within};
 pub use ospa::{Ospa, OspaParts, OspaScore};
 pub use ospa2::Ospa2;
 pub use rmse::Rmse;
-pub use trajectory::Trajectory;
+pub use trajectory::{Trajectory, Walk};
 pub use trajectory_gospa::{TrajectoryGospa, TrajectoryGospaParts, TrajectoryGospaScore};
 pub use wasserstein::{Wasserstein, wasserstein};

@@ -52,3 +52,49 @@ impl<const D: usize> Trajectory<D> {
         Err(FilterError::NotFinite { what: "position" })
     }
 }
+
+/// Goes through the steps of many trajectories once, and knows who is there: the time of all steps together follows the number
+/// of positions, not that of trajectories times steps.
+///
+/// ```
+/// use tercel_core::metric::{Trajectory, Walk};
+///
+/// let tracks = [Trajectory::new(3, [[0.0], [1.0]]), Trajectory::new(0, [[9.0]]), Trajectory::new(4, [[5.0]])];
+/// let mut walk = Walk::new(&tracks);
+/// assert_eq!(walk.at(0), (vec![1], vec![[9.0]]));
+/// assert_eq!(walk.at(4), (vec![0, 2], vec![[1.0], [5.0]]));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Walk<'a, const D: usize> {
+    trajectories: &'a [Trajectory<D>],
+    /// Those that have not begun, the next one last.
+    waiting: Vec<usize>,
+    /// Those that have begun and not ended, rising.
+    alive: Vec<usize>,
+}
+
+impl<'a, const D: usize> Walk<'a, D> {
+    /// A walk that has not begun.
+    pub fn new(trajectories: &'a [Trajectory<D>]) -> Self {
+        let mut waiting: Vec<usize> = (0..trajectories.len()).collect();
+        waiting.sort_by_key(|&one| std::cmp::Reverse(trajectories[one].start));
+        Walk { trajectories, waiting, alive: Vec::new() }
+    }
+
+    /// Numbers, rising, and positions (m) of the trajectories that have one at `step`. A step before that of the last call
+    /// may miss some.
+    pub fn at(&mut self, step: usize) -> (Vec<usize>, Vec<[f64; D]>) {
+        let all = self.trajectories;
+        self.alive.retain(|&one| all[one].steps().contains(&step));
+        let before = self.alive.len();
+        while let Some(one) = self.waiting.pop_if(|one| all[*one].start <= step) {
+            if all[one].steps().contains(&step) {
+                self.alive.push(one);
+            }
+        }
+        if self.alive.len() > before {
+            self.alive.sort_unstable();
+        }
+        self.alive.iter().filter_map(|&one| Some((one, *all[one].at(step)?))).unzip()
+    }
+}

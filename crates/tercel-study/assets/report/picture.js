@@ -1,7 +1,7 @@
 // A recording on the page: plan view, player, layers, table of tracks, and charts that follow the time.
 
 const TAILS = [0, 5, 10, 30, 60, 120, 300, 600, 1800, Infinity];
-const SPEEDS = [0.5, 1, 2, 5, 10, 20, 50, 100, 200];
+const SPEEDS = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 
 /** Fills a section with a picture; returns what the page needs to steer it. */
 function createPicture(section, data) {

@@ -1,6 +1,6 @@
 //! Who was where, time by time.
 
-use tercel_core::metric::{NearIndex, Trajectory};
+use tercel_core::metric::{NearIndex, Trajectory, Walk};
 
 use crate::timeline::{Reach, Rule, Timeline};
 
@@ -27,36 +27,21 @@ impl Lives {
         lives
     }
 
-    pub(super) fn walk(&self) -> Walk<'_> {
-        let mut waiting: Vec<usize> = (0..self.pieces.len()).collect();
-        waiting.sort_by_key(|&piece| std::cmp::Reverse(self.pieces[piece].start));
-        Walk { lives: self, waiting, alive: Vec::new() }
+    pub(super) fn walk(&self) -> Walk<'_, 2> {
+        Walk::new(&self.pieces)
+    }
+
+    /// Owners, rising, and places of the pieces that a walk finds at a step. The pieces are sorted by their owners.
+    pub(super) fn at(&self, walk: &mut Walk<'_, 2>, step: usize) -> Here {
+        let (pieces, places) = walk.at(step);
+        Here { owners: pieces.into_iter().map(|piece| self.owners[piece]).collect(), places }
     }
 }
 
-/// Goes through the times once and knows who is alive.
-pub(super) struct Walk<'a> {
-    lives: &'a Lives,
-    /// Pieces that have not begun, the next one last.
-    waiting: Vec<usize>,
-    /// Pieces that are there, by their owners.
-    alive: Vec<usize>,
-}
-
-impl Walk<'_> {
-    /// Owners and places at a step; steps must not fall.
-    pub(super) fn at(&mut self, step: usize) -> (Vec<usize>, Vec<[f64; 2]>) {
-        let Lives { pieces, owners } = self.lives;
-        self.alive.retain(|&piece| pieces[piece].steps().contains(&step));
-        let before = self.alive.len();
-        while let Some(piece) = self.waiting.pop_if(|piece| pieces[*piece].start <= step) {
-            self.alive.push(piece);
-        }
-        if self.alive.len() > before {
-            self.alive.sort_by_key(|&piece| owners[piece]);
-        }
-        self.alive.iter().filter_map(|&piece| Some((owners[piece], *pieces[piece].at(step)?))).unzip()
-    }
+/// Whoever is there at one time.
+pub(super) struct Here {
+    owners: Vec<usize>,
+    places: Vec<[f64; 2]>,
 }
 
 /// Objects and tracks at one time, and who is near whom.
@@ -83,15 +68,10 @@ pub(super) enum Standing {
 }
 
 impl Picture {
-    pub(super) fn new(
-        (object_ids, objects): (Vec<usize>, Vec<[f64; 2]>),
-        (track_ids, tracks): (Vec<usize>, Vec<[f64; 2]>),
-        cutoff: f64,
-        neighbourhood: f64,
-    ) -> Self {
-        let index = NearIndex::new(&objects);
-        let (mut near, mut standing) = (Vec::new(), Vec::with_capacity(tracks.len()));
-        for (track, place) in tracks.iter().enumerate() {
+    pub(super) fn new(objects: Here, tracks: Here, cutoff: f64, neighbourhood: f64) -> Self {
+        let index = NearIndex::new(&objects.places);
+        let (mut near, mut standing) = (Vec::new(), Vec::with_capacity(tracks.places.len()));
+        for (track, place) in tracks.places.iter().enumerate() {
             let before = near.len();
             let close = index.within(place, cutoff).filter(|(_, distance)| *distance < cutoff);
             near.extend(close.map(|(object, distance)| (object, track, distance)));
@@ -102,7 +82,7 @@ impl Picture {
             });
         }
         near.sort_unstable_by_key(|&(object, track, _)| (object, track));
-        Picture { object_ids, track_ids, near, standing }
+        Picture { object_ids: objects.owners, track_ids: tracks.owners, near, standing }
     }
 
     /// How many tracks stand so.

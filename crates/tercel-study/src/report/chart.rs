@@ -5,6 +5,9 @@ use serde::Serialize;
 use super::ReportError;
 use super::number::Number;
 
+/// More points than this are drawn as means of neighbours: a screen has fewer columns.
+const DRAWN_POINTS: usize = 4_000;
+
 /// Curves that share an abscissa: parts of a metric over time, an error over the noise, ...
 ///
 /// ```
@@ -114,13 +117,15 @@ impl Chart {
         self.parts.iter().map(|part| (part.name.as_str(), part.values.as_slice()))
     }
 
-    /// The data of the chart, with `start` subtracted from its abscissa.
+    /// The data of the chart, with `start` subtracted from its abscissa. Of very many points, means of neighbours are drawn,
+    /// and the title says so.
     pub(super) fn data(&self, start: f64) -> Result<ChartData, ReportError> {
+        let joined = self.x.len().div_ceil(DRAWN_POINTS).max(1);
         let mut parts = Vec::with_capacity(self.parts.len());
         for part in &self.parts {
             let column = |values: &Vec<f64>| {
                 if values.len() == self.x.len() {
-                    return Ok(values.iter().map(|&value| Number::significant(value)).collect());
+                    return Ok(means(values, joined).map(Number::significant).collect());
                 }
                 Err(ReportError::ChartLength {
                     chart: self.title.clone(),
@@ -140,15 +145,31 @@ impl Chart {
                 band,
             });
         }
+        let title = match joined {
+            1 => self.title.clone(),
+            _ => format!("{} (each point is the mean of {joined})", self.title),
+        };
         Ok(ChartData {
-            title: self.title.clone(),
+            title,
             unit: self.unit.clone(),
             abscissa: self.abscissa.clone(),
             form: self.form,
-            x: self.x.iter().map(|&x| Number::rounded(x - start, 6)).collect(),
+            x: means(&self.x, joined).map(|x| Number::rounded(x - start, 6)).collect(),
             parts,
         })
     }
+}
+
+/// Means of each `joined` neighbours; unknown values are left out.
+fn means(values: &[f64], joined: usize) -> impl Iterator<Item = f64> {
+    values.chunks(joined).map(move |chunk| {
+        let (mut mean, mut count) = (0.0, 0.0);
+        for &value in chunk.iter().filter(|value| joined == 1 || !value.is_nan()) {
+            count += 1.0;
+            mean += (value - mean) / count;
+        }
+        if count > 0.0 { mean } else { f64::NAN }
+    })
 }
 
 /// A chart as the page reads it.
@@ -197,6 +218,23 @@ mod tests {
         let json = serde_json::to_value(chart(vec![3.5, 4.5]).data(0.0).unwrap()).unwrap();
         assert_eq!(json["parts"][0]["band"], serde_json::json!([[2.5, 3.5], [3.5, 4.5]]));
         assert!(chart(vec![3.5]).data(0.0).unwrap_err().to_string().contains("1 values for 2 points"));
+    }
+
+    #[test]
+    fn many_points_become_means_of_neighbours_and_the_title_says_so() {
+        let x: Vec<f64> = (0..12_000).map(f64::from).collect();
+        let mut y = vec![2.0; 12_000];
+        (y[0], y[1]) = (8.0, f64::NAN);
+        let json =
+            serde_json::to_value(Chart::over_time("OSPA", "m", x).with_part("ours", y).data(0.0).unwrap())
+                .unwrap();
+        assert_eq!(json["title"], "OSPA (each point is the mean of 3)");
+        assert_eq!(json["x"].as_array().unwrap().len(), 4_000);
+        assert_eq!((&json["x"][0], &json["x"][3999]), (&serde_json::json!(1), &serde_json::json!(11_998)));
+        assert_eq!(
+            (&json["parts"][0]["y"][0], &json["parts"][0]["y"][1]),
+            (&serde_json::json!(5), &serde_json::json!(2))
+        );
     }
 
     #[test]

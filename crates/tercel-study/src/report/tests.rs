@@ -153,3 +153,70 @@ fn a_path_that_cannot_be_written_is_named() {
     let error = Report::new("lost").write(folder.path().join("missing/report.html")).unwrap_err();
     assert!(error.to_string().contains("missing"), "{error}");
 }
+
+/// Twenty objects at a time over many scans, each with a track and four false detections beside it.
+fn long(scans: usize) -> (Detections, Tracks, Truths) {
+    let (mut seen, mut told, mut known) = (Detections::default(), tracks("cv", 1.0), Truths::default());
+    let (row, plot) = (told.rows.remove(0), detections("radar", 1.0).scans.remove(0).detections.remove(0));
+    let truth = truths("boat", 1.0).rows.remove(0);
+    for scan in 0..scans {
+        let time = scan as f64;
+        let place =
+            |k: usize| [1000.0 * (0.01 * time + k as f64).sin(), 1000.0 * (0.013 * time + k as f64).cos()];
+        let plots = (0..100).map(|k| {
+            let [x, y] = place(k);
+            Detection {
+                id: (100 * scan + k) as u64,
+                observation: Observation::Position { x, y, z: None },
+                ..plot.clone()
+            }
+        });
+        let detections = plots.collect();
+        seen.scans.push(Scan { time, sensor: "radar".into(), position: Some([1.5, 2.5, 0.0]), detections });
+        for k in 0..20 {
+            let ([x, y], life) = (place(k), (scan + 10 * k) / 200);
+            let number = (20 * life + k) as u64;
+            told.rows.push(Track {
+                time,
+                track: number,
+                state: vec![x, y, 1.234, 5.678],
+                detection: Some((100 * scan + k) as u64),
+                ..row.clone()
+            });
+            known.rows.push(Truth {
+                time,
+                object: format!("boat {number}").into(),
+                position: [x, y],
+                ..truth.clone()
+            });
+        }
+    }
+    (seen, told, known)
+}
+
+#[test]
+fn a_long_recording_stays_a_small_page_that_says_what_it_leaves_out() {
+    let (seen, told, known) = long(20_000);
+    let page = |seen: &Detections, told: &Tracks, known: &Truths| {
+        let time: Vec<f64> = seen.scans.iter().map(|scan| scan.time).collect();
+        let gospa = Chart::over_time("GOSPA", "m", time.clone())
+            .with_part("missed", time.iter().map(|t| t.sin()).collect());
+        let picture = Picture::new(seen, told, Some(known), &[]).unwrap().with_chart(gospa);
+        Report::new("long").with(picture).render().unwrap()
+    };
+    let long_page = page(&seen, &told, &known);
+    assert!(long_page.len() < 15_000_000, "{} bytes", long_page.len());
+    let notes = data_of(&long_page)[0]["notes"].to_string();
+    for note in [
+        "of 2000000 detections is drawn",
+        "of 400000 rows of tracks is drawn",
+        "of 400000 rows of the truth is drawn",
+    ] {
+        assert!(notes.contains(note), "{note} is missing in {notes}");
+    }
+    let (seen, told, known) = long(100);
+    let short_page = data_of(&page(&seen, &told, &known));
+    assert_eq!(short_page[0]["notes"], serde_json::json!([]));
+    assert_eq!(short_page[0]["detections"]["id"].as_array().unwrap().len(), 10_000);
+    assert_eq!(short_page[0]["times"].as_array().unwrap().len(), 100);
+}

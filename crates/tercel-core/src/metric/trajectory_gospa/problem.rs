@@ -1,42 +1,55 @@
-//! From trajectories to clusters of paths, and back to parts.
+//! From trajectories to pairs that come near each other, and from paths back to parts.
 
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use super::TrajectoryGospaParts;
-use super::chain::Chain;
-use super::relaxation::{Relaxation, Solution};
-use crate::metric::scale::{Scale, euclidean};
-use crate::metric::trajectory::Trajectory;
+use super::groups::Groups;
+use crate::metric::near::pairs_within;
+use crate::metric::scale::Scale;
+use crate::metric::trajectory::{Trajectory, Walk};
 
-/// Bounds have met when they differ by this share of `cᵖ/2` for each step of each trajectory.
-const TOLERANCE: f64 = 1e-10;
-/// Climbs of the prices before the linear programme is called.
-const CLIMBS: usize = 400;
+/// The distances of an object and a track, from the first to the last step at which they are closer than the cut-off;
+/// infinite where they are not.
+pub(super) struct Pair {
+    pub(super) object: usize,
+    pub(super) track: usize,
+    pub(super) first: usize,
+    pub(super) distances: Vec<f64>,
+}
 
-/// What is gained at each step when a track stands for an object: `cᵖ - d(x_i, y_j)ᵖ`.
-struct Pair {
-    object: usize,
-    track: usize,
-    first: usize,
-    gains: Vec<f64>,
+impl Pair {
+    /// The distance at a step, if the two are closer than the cut-off then.
+    pub(super) fn at(&self, step: usize) -> Option<f64> {
+        let distance = *self.distances.get(step.checked_sub(self.first)?)?;
+        distance.is_finite().then_some(distance)
+    }
+
+    pub(super) fn steps(&self) -> Range<usize> {
+        self.first..self.first + self.distances.len()
+    }
 }
 
 /// Which objects and tracks exist at each step, and which of them come near each other.
 pub(super) struct Problem {
+    pub(super) scale: Scale,
+    /// The switch penalty `γ` (m).
+    pub(super) switch: f64,
     steps: Range<usize>,
-    objects: usize,
-    tracks: usize,
     /// Numbers of objects and of tracks at each step.
     existing: Vec<(f64, f64)>,
-    pairs: Vec<Pair>,
-    highest: f64,
+    /// By object, then by track.
+    pub(super) pairs: Vec<Pair>,
+    /// For each track the steps from the first to the last at which it is near any object.
+    pub(super) contested: Vec<Range<usize>>,
 }
 
-/// Parts of each step, steps of each pair, and how far the sum may lie above the minimum.
-#[derive(Default)]
+/// Parts of each step, steps of each pair, the sum of all, and how far that may lie above the minimum.
 pub(super) struct Solved {
+    pub(super) total: f64,
     pub(super) steps: Vec<TrajectoryGospaParts>,
     pub(super) pairs: Vec<(usize, usize, f64)>,
+    pub(super) switches: f64,
     pub(super) gap: f64,
 }
 
@@ -44,24 +57,32 @@ impl Problem {
     pub(super) fn new<const D: usize>(
         truth: &[Trajectory<D>],
         tracks: &[Trajectory<D>],
-        scale: &Scale,
+        scale: Scale,
+        switch: f64,
     ) -> Self {
         let all = || truth.iter().chain(tracks).filter(|one| !one.positions.is_empty());
         let start = all().map(|one| one.start).min().unwrap_or(0);
         let end = all().map(|one| one.steps().end).max().unwrap_or(start);
-        let mut existing = vec![(0.0, 0.0); end - start];
-        for (step, count) in (start..end).zip(&mut existing) {
-            let at = |set: &[Trajectory<D>]| set.iter().filter(|one| one.at(step).is_some()).count() as f64;
-            *count = (at(truth), at(tracks));
-        }
-        let mut pairs = Vec::new();
-        for (object, x) in truth.iter().enumerate() {
-            for (track, y) in tracks.iter().enumerate() {
-                pairs.extend(pair(x, y, scale).map(|(first, gains)| Pair { object, track, first, gains }));
+        let (mut objects, mut reported) = (Walk::new(truth), Walk::new(tracks));
+        let mut existing = Vec::with_capacity(end - start);
+        let mut near = NearPairs::default();
+        for step in start..end {
+            let ((rows, there), (columns, here)) = (objects.at(step), reported.at(step));
+            existing.push((rows.len() as f64, columns.len() as f64));
+            for (i, j, distance) in pairs_within(&there, &here, scale.cutoff) {
+                if distance < scale.cutoff {
+                    near.push(rows[i], columns[j], step, distance);
+                }
             }
         }
-        let (objects, tracks) = (truth.len(), tracks.len());
-        Problem { steps: start..end, objects, tracks, existing, pairs, highest: scale.highest() }
+        let pairs = near.sorted();
+        let mut contested = vec![0..0; tracks.len()];
+        for pair in &pairs {
+            let (own, steps): (&mut Range<usize>, _) = (&mut contested[pair.track], pair.steps());
+            let new = own.start == own.end;
+            *own = if new { steps } else { own.start.min(steps.start)..own.end.max(steps.end) };
+        }
+        Problem { scale, switch, steps: start..end, existing, pairs, contested }
     }
 
     /// The first step at which anything exists.
@@ -69,135 +90,120 @@ impl Problem {
         self.steps.start
     }
 
-    /// Finds the best weights for a price `change` of taking or leaving a track.
-    pub(super) fn solve(&self, change: f64) -> Solved {
-        let mut solved = Solved::default();
-        solved.steps.resize(self.existing.len(), TrajectoryGospaParts::default());
-        let mut found = vec![0.0; self.existing.len()];
-        for cluster in self.clusters() {
-            self.solve_cluster(&cluster, change, &mut solved, &mut found);
-        }
-        let half = 0.5 * self.highest;
-        for ((parts, found), (objects, tracks)) in solved.steps.iter_mut().zip(found).zip(&self.existing) {
-            parts.missed = half * (objects - found).max(0.0);
-            parts.false_alarm = half * (tracks - found).max(0.0);
-        }
-        solved.pairs.sort_by_key(|(object, track, _)| (*object, *track));
-        solved
+    /// The pair of an object and a track, if they come near each other.
+    pub(super) fn pair(&self, object: usize, track: usize) -> Option<&Pair> {
+        let found = self.pairs.binary_search_by_key(&(object, track), |pair| (pair.object, pair.track));
+        found.ok().map(|place| &self.pairs[place])
     }
 
-    /// Pairs whose objects or tracks are joined by others.
-    fn clusters(&self) -> Vec<Vec<&Pair>> {
-        let mut parents: Vec<usize> = (0..self.objects + self.tracks).collect();
-        for pair in &self.pairs {
-            let (a, b) = (root(&mut parents, pair.object), root(&mut parents, self.objects + pair.track));
-            parents[a.max(b)] = a.min(b);
-        }
-        let mut clusters: Vec<Vec<&Pair>> = vec![Vec::new(); self.objects + self.tracks];
-        for pair in &self.pairs {
-            clusters[root(&mut parents, pair.object)].push(pair);
-        }
-        clusters.retain(|cluster| !cluster.is_empty());
-        clusters
+    /// The pairs of one object.
+    pub(super) fn pairs_of(&self, object: usize) -> &[Pair] {
+        let first = self.pairs.partition_point(|pair| pair.object < object);
+        let last = self.pairs.partition_point(|pair| pair.object <= object);
+        &self.pairs[first..last]
     }
 
-    fn solve_cluster(&self, cluster: &[&Pair], change: f64, solved: &mut Solved, found: &mut [f64]) {
-        let start = cluster.iter().map(|pair| pair.first).min().unwrap_or(0);
-        let end = cluster.iter().map(|pair| pair.first + pair.gains.len()).max().unwrap_or(start);
-        let steps = end - start;
-        let objects = numbers(cluster.iter().map(|pair| pair.object));
-        let tracks = numbers(cluster.iter().map(|pair| pair.track));
-        let mut chains = vec![Chain { gains: Vec::new(), change, steps }; objects.len()];
-        for pair in cluster {
-            let mut gains = vec![0.0; steps];
-            gains[pair.first - start..][..pair.gains.len()].copy_from_slice(&pair.gains);
-            let track = place(&tracks, pair.track) as u32;
-            chains[place(&objects, pair.object)].gains.push((track, gains));
+    /// Finds the best weights and what they cost.
+    pub(super) fn solve(&self) -> Solved {
+        let groups = Groups::solve(self);
+        let mut account = Account::new(self);
+        groups.each_share(|object, share, steps| account.add(object, share, steps));
+        account.close(groups.gap())
+    }
+}
+
+/// The pairs while they grow, step by step.
+#[derive(Default)]
+struct NearPairs {
+    pairs: Vec<Pair>,
+    places: HashMap<(usize, usize), usize>,
+}
+
+impl NearPairs {
+    fn push(&mut self, object: usize, track: usize, step: usize, distance: f64) {
+        let place = *self.places.entry((object, track)).or_insert_with(|| {
+            self.pairs.push(Pair { object, track, first: step, distances: Vec::new() });
+            self.pairs.len() - 1
+        });
+        let pair = &mut self.pairs[place];
+        pair.distances.resize(step - pair.first, f64::INFINITY);
+        pair.distances.push(distance);
+    }
+
+    fn sorted(mut self) -> Vec<Pair> {
+        self.pairs.sort_unstable_by_key(|pair| (pair.object, pair.track));
+        self.pairs
+    }
+}
+
+/// One step of a path: its track, if it has one, and how often a track is taken or left then.
+pub(super) struct PathStep {
+    pub(super) step: usize,
+    pub(super) track: Option<usize>,
+    pub(super) changes: f64,
+}
+
+/// What the paths cost, part by part.
+struct Account<'a> {
+    problem: &'a Problem,
+    steps: Vec<TrajectoryGospaParts>,
+    found: Vec<f64>,
+    /// Weights and distances of what was found.
+    localised: Vec<(f64, f64)>,
+    together: BTreeMap<(usize, usize), f64>,
+    switches: f64,
+}
+
+impl<'a> Account<'a> {
+    fn new(problem: &'a Problem) -> Self {
+        Account {
+            problem,
+            steps: vec![TrajectoryGospaParts::default(); problem.existing.len()],
+            found: vec![0.0; problem.existing.len()],
+            localised: Vec::new(),
+            together: BTreeMap::new(),
+            switches: 0.0,
         }
-        let tolerance = TOLERANCE * 0.5 * self.highest * (steps * (objects.len() + tracks.len())) as f64;
-        let relaxation =
-            Relaxation { chains: &chains, tracks: tracks.len(), steps, tolerance, climbs: CLIMBS };
-        let solution = relaxation.solve();
-        solved.gap += solution.gap;
-        let first = start - self.steps.start;
-        let (parts, found) = (&mut solved.steps[first..][..steps], &mut found[first..][..steps]);
-        for (object, chain) in chains.iter().enumerate() {
-            for (track, gains) in &chain.gains {
-                let weights = weights(&solution, object, *track, steps);
-                let together = self.account(&weights, gains, change, parts, found);
-                if together > 0.0 {
-                    solved.pairs.push((objects[object], tracks[*track as usize], together));
-                }
+    }
+
+    /// Adds what an object does with a share of its weight.
+    fn add(&mut self, object: usize, share: f64, path: &[PathStep]) {
+        let (scale, penalty) = (&self.problem.scale, self.problem.scale.power(self.problem.switch));
+        let mut pair: Option<&Pair> = None;
+        for &PathStep { step, track, changes } in path {
+            let at = step - self.problem.steps.start;
+            if changes > 0.0 {
+                self.switches += 0.5 * share * changes;
+                self.steps[at].switches += 0.5 * share * changes * penalty;
+            }
+            let Some(track) = track else { continue };
+            if pair.is_none_or(|pair| pair.track != track) {
+                pair = self.problem.pair(object, track);
+            }
+            if let Some(distance) = pair.and_then(|pair| pair.at(step)) {
+                self.localised.push((share, distance));
+                self.steps[at].localisation += share * scale.power(distance);
+                self.found[at] += share;
+                *self.together.entry((object, track)).or_default() += share;
             }
         }
     }
 
-    /// Adds localisation, switches and what was found of one pair; returns for how many steps the two were together.
-    fn account(
-        &self,
-        weights: &[f64],
-        gains: &[f64],
-        change: f64,
-        parts: &mut [TrajectoryGospaParts],
-        found: &mut [f64],
-    ) -> f64 {
-        let mut together = 0.0;
-        for (step, (&weight, &gain)) in weights.iter().zip(gains).enumerate() {
-            if gain > 0.0 {
-                parts[step].localisation += weight * (self.highest - gain);
-                found[step] += weight;
-                together += weight;
-            }
-            if step > 0 {
-                parts[step].switches += change * (weight - weights[step - 1]).abs();
-            }
+    fn close(mut self, gap: f64) -> Solved {
+        let scale = &self.problem.scale;
+        let mut alone = 0.0;
+        for ((parts, found), (objects, tracks)) in
+            self.steps.iter_mut().zip(&self.found).zip(&self.problem.existing)
+        {
+            let (missed, false_alarms) = ((objects - found).max(0.0), (tracks - found).max(0.0));
+            parts.missed = scale.price(0.5 * missed);
+            parts.false_alarm = scale.price(0.5 * false_alarms);
+            alone += 0.5 * (missed + false_alarms);
         }
-        together
+        let prices = [(alone, scale.cutoff), (self.switches, self.problem.switch)];
+        let total = scale.norm(self.localised.iter().copied().chain(prices));
+        let pairs =
+            self.together.into_iter().map(|((object, track), steps)| (object, track, steps)).collect();
+        Solved { total, steps: self.steps, pairs, switches: self.switches, gap }
     }
-}
-
-/// How much of an object a track stands for at each step.
-fn weights(solution: &Solution, object: usize, track: u32, steps: usize) -> Vec<f64> {
-    let mut weights = vec![0.0; steps];
-    for share in solution.shares.iter().filter(|share| share.object == object) {
-        for (weight, own) in weights.iter_mut().zip(&share.path) {
-            if *own == track {
-                *weight += share.share;
-            }
-        }
-    }
-    weights
-}
-
-/// First step and gains of the time between the first and the last at which the two are closer than the cut-off.
-fn pair<const D: usize>(x: &Trajectory<D>, y: &Trajectory<D>, scale: &Scale) -> Option<(usize, Vec<f64>)> {
-    let highest = scale.highest();
-    let gain = |step: usize| match (x.at(step), y.at(step)) {
-        (Some(x), Some(y)) => highest - scale.power(euclidean(x, y).min(scale.cutoff)),
-        _ => 0.0,
-    };
-    let mut common = x.start.max(y.start)..x.steps().end.min(y.steps().end);
-    let first = common.find(|step| gain(*step) > 0.0)?;
-    let last = common.rfind(|step| gain(*step) > 0.0).unwrap_or(first);
-    Some((first, (first..=last).map(gain).collect()))
-}
-
-fn root(parents: &mut [usize], mut of: usize) -> usize {
-    while parents[of] != of {
-        parents[of] = parents[parents[of]];
-        of = parents[of];
-    }
-    of
-}
-
-/// Sorted, each once.
-fn numbers(all: impl Iterator<Item = usize>) -> Vec<usize> {
-    let mut numbers: Vec<usize> = all.collect();
-    numbers.sort_unstable();
-    numbers.dedup();
-    numbers
-}
-
-fn place(numbers: &[usize], number: usize) -> usize {
-    numbers.partition_point(|other| *other < number)
 }

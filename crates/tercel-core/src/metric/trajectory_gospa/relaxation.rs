@@ -1,13 +1,16 @@
-//! The best paths of the objects of one cluster that share its tracks.
+//! The best paths of the objects of one group that share its tracks.
 
 use std::collections::HashMap;
 
-use super::chain::{Chain, Memory, NONE, Path, Prices};
+use super::chain::{Chain, Memory, NONE, Path};
 use super::simplex::{Optimum, Programme};
 use crate::association::AssignmentSolver;
 
 /// Rounds of the linear programme.
 const ROUNDS: usize = 100;
+
+/// The share of the cost by which bounds that have met may differ.
+const RELATIVE: f64 = 1e-6;
 
 /// A path of one object and the share that it has.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,15 +24,17 @@ pub(super) struct Share {
 #[derive(Debug)]
 pub(super) struct Solution {
     pub(super) shares: Vec<Share>,
+    pub(super) cost: f64,
     pub(super) gap: f64,
 }
 
-/// One cluster: its objects, and how many tracks and steps it has.
+/// One group: its objects, and how many tracks it has.
 pub(super) struct Relaxation<'a> {
     pub(super) chains: &'a [Chain],
     pub(super) tracks: usize,
-    pub(super) steps: usize,
-    /// Bounds that are this close have met.
+    /// How many prices there are: one for each track and step at which the track is near anyone.
+    pub(super) places: usize,
+    /// Bounds that are this close have met, unless the cost itself is smaller still.
     pub(super) tolerance: f64,
     /// Climbs of the prices before the linear programme is called.
     pub(super) climbs: usize,
@@ -43,7 +48,7 @@ struct Answer {
 
 /// The search so far.
 struct State {
-    prices: Prices,
+    prices: Vec<f64>,
     bound: f64,
     paths: Vec<Path>,
     cost: f64,
@@ -69,16 +74,16 @@ impl Pool {
 
 impl Relaxation<'_> {
     pub(super) fn solve(&self) -> Solution {
+        let paths: Vec<Path> = self.alone();
         let mut state = State {
-            prices: Prices::new(self.tracks, self.steps),
+            prices: vec![0.0; self.places],
             bound: f64::NEG_INFINITY,
-            paths: vec![vec![NONE; self.steps]; self.chains.len()],
-            cost: 0.0,
+            cost: self.cost(&paths),
+            paths,
             pool: Pool { paths: Vec::new(), known: HashMap::new() },
             memory: Memory::default(),
         };
-        let none = vec![NONE; self.steps];
-        (0..self.chains.len()).for_each(|object| state.pool.add(object, &none));
+        state.paths.iter().enumerate().for_each(|(object, path)| state.pool.add(object, path));
         let start = state.prices.clone();
         self.answer(&start, &mut state);
         if !self.met(&state) {
@@ -87,17 +92,31 @@ impl Relaxation<'_> {
             self.repair(&mut state);
             self.climb(&mut state);
         }
-        if self.met(&state) { state.whole() } else { self.generate(state) }
+        let prices: f64 = state.prices.iter().sum();
+        let (steps, cost) = (self.chains.iter().map(|chain| chain.alone.len()).sum::<usize>(), state.cost);
+        let mut solution = if self.met(&state) { state.whole() } else { self.generate(state) };
+        // What the sums of both bounds may have lost.
+        solution.gap += f64::EPSILON * steps as f64 * (cost + prices);
+        solution
+    }
+
+    /// The paths without any track.
+    fn alone(&self) -> Vec<Path> {
+        self.chains.iter().map(|chain| vec![NONE; chain.alone.len()]).collect()
     }
 
     fn met(&self, state: &State) -> bool {
-        state.cost - state.bound <= self.tolerance
+        state.cost - state.bound <= self.tolerance(state.cost)
+    }
+
+    fn tolerance(&self, cost: f64) -> f64 {
+        self.tolerance.min(RELATIVE * cost.abs())
     }
 
     /// Finds the cheapest paths under these prices, and keeps what is better than before: the bound that they prove, and the
     /// paths if they do not collide.
-    fn answer(&self, prices: &Prices, state: &mut State) -> Answer {
-        let mut bound = -prices.sum();
+    fn answer(&self, prices: &Vec<f64>, state: &mut State) -> Answer {
+        let mut bound = -prices.iter().sum::<f64>();
         let mut paths = Vec::with_capacity(self.chains.len());
         for (object, chain) in self.chains.iter().enumerate() {
             let (cost, path) = chain.best(prices, &mut state.memory);
@@ -109,7 +128,7 @@ impl Relaxation<'_> {
             state.bound = bound;
             state.prices.clone_from(prices);
         }
-        if self.uses(prices, &paths).iter().all(|uses| *uses <= 1) {
+        if self.uses(&paths).iter().all(|uses| *uses <= 1) {
             let cost = self.cost(&paths);
             if cost < state.cost {
                 state.cost = cost;
@@ -123,32 +142,40 @@ impl Relaxation<'_> {
         self.chains.iter().zip(paths).map(|(chain, path)| chain.cost(path)).sum()
     }
 
-    fn uses(&self, prices: &Prices, paths: &[Path]) -> Vec<u32> {
-        let mut uses = vec![0; self.tracks * self.steps];
-        for path in paths {
-            for (step, &track) in path.iter().enumerate().filter(|(_, track)| **track != NONE) {
-                uses[prices.place(track, step)] += 1;
-            }
+    fn uses(&self, paths: &[Path]) -> Vec<u32> {
+        let mut uses = vec![0; self.places];
+        for (chain, path) in self.chains.iter().zip(paths) {
+            chain.uses(path).into_iter().for_each(|place| uses[place] += 1);
         }
         uses
     }
 
     /// The prices at which each single step, without the cost of changes, has its best assignment.
-    fn single_steps(&self) -> Prices {
-        let mut prices = Prices::new(self.tracks, self.steps);
-        let mut solver = AssignmentSolver::new();
-        let (mut entries, misses) = (Vec::new(), vec![0.0; self.chains.len()]);
-        for step in 0..self.steps {
-            entries.clear();
-            for (object, chain) in self.chains.iter().enumerate() {
-                let gains = chain.gains.iter().filter(|(_, gains)| gains[step] > 0.0);
-                entries.extend(gains.map(|(track, gains)| (object, *track as usize, -gains[step])));
+    fn single_steps(&self) -> Vec<f64> {
+        let first = self.chains.iter().map(|chain| chain.steps.start).min().unwrap_or(0);
+        let last = self.chains.iter().map(|chain| chain.steps.end).max().unwrap_or(first);
+        // Object, track, what it saves, and its place, for each step.
+        let mut steps: Vec<Vec<(usize, usize, f64, usize)>> = vec![Vec::new(); last - first];
+        for (object, chain) in self.chains.iter().enumerate() {
+            for near in &chain.near {
+                for (i, cost) in near.costs.iter().enumerate() {
+                    let step = near.first + i;
+                    let saved = chain.alone[step - chain.steps.start] - cost;
+                    if saved > 0.0 {
+                        steps[step - first].push((object, near.track as usize, saved, near.place + i));
+                    }
+                }
             }
-            // Gains are finite, so that no problem is refused; without prices the climb starts lower.
-            if let Ok(best) = solver.solve_sparse(&entries, self.tracks, &misses) {
-                for (track, dual) in best.column_duals.iter().enumerate() {
-                    let place = prices.place(track as u32, step);
-                    prices.values[place] = (-dual).max(0.0);
+        }
+        let mut prices = vec![0.0; self.places];
+        let mut solver = AssignmentSolver::new();
+        let misses = vec![0.0; self.chains.len()];
+        for entries in steps.iter().filter(|entries| entries.len() > 1) {
+            let costs: Vec<_> = entries.iter().map(|entry| (entry.0, entry.1, -entry.2)).collect();
+            // Costs are finite, so that no problem is refused; without prices the climb starts lower.
+            if let Ok(best) = solver.solve_sparse(&costs, self.tracks, &misses) {
+                for (_, track, _, place) in entries {
+                    prices[*place] = (-best.column_duals[*track]).max(0.0);
                 }
             }
         }
@@ -161,15 +188,15 @@ impl Relaxation<'_> {
         let order: Vec<usize> = (0..self.chains.len()).collect();
         let back: Vec<usize> = order.iter().rev().copied().collect();
         for order in [order, back] {
-            let mut paths = vec![vec![NONE; self.steps]; self.chains.len()];
+            let mut paths = self.alone();
             let prices = state.prices.clone();
             self.sweep(&prices, &order, &mut paths, &mut state.memory);
-            let free = Prices::new(self.tracks, self.steps);
+            let free = vec![0.0; self.places];
             let mut cost = self.cost(&paths);
             loop {
                 self.sweep(&free, &order, &mut paths, &mut state.memory);
                 let next = self.cost(&paths);
-                if next >= cost - self.tolerance {
+                if next >= cost - self.tolerance(cost) {
                     break;
                 }
                 cost = next;
@@ -184,13 +211,18 @@ impl Relaxation<'_> {
         }
     }
 
-    fn sweep(&self, prices: &Prices, order: &[usize], paths: &mut [Path], memory: &mut Memory) {
-        let mut blocked = prices.clone();
-        paths.iter().for_each(|path| block(&mut blocked, prices, path, true));
+    fn sweep(&self, prices: &[f64], order: &[usize], paths: &mut [Path], memory: &mut Memory) {
+        let mut blocked = prices.to_vec();
+        let block = |blocked: &mut Vec<f64>, object: usize, path: &Path, taken: bool| {
+            for place in self.chains[object].uses(path) {
+                blocked[place] = if taken { f64::INFINITY } else { prices[place] };
+            }
+        };
+        paths.iter().enumerate().for_each(|(object, path)| block(&mut blocked, object, path, true));
         for &object in order {
-            block(&mut blocked, prices, &paths[object], false);
+            block(&mut blocked, object, &paths[object], false);
             paths[object] = self.chains[object].best(&blocked, memory).1;
-            block(&mut blocked, prices, &paths[object], true);
+            block(&mut blocked, object, &paths[object], true);
         }
     }
 
@@ -215,8 +247,8 @@ impl Relaxation<'_> {
                 self.repair(state);
             }
             let mut slopes: Vec<f64> =
-                self.uses(&prices, &answer.paths).iter().map(|uses| f64::from(*uses) - 1.0).collect();
-            for (slope, price) in slopes.iter_mut().zip(&prices.values) {
+                self.uses(&answer.paths).iter().map(|uses| f64::from(*uses) - 1.0).collect();
+            for (slope, price) in slopes.iter_mut().zip(&prices) {
                 *slope = if *price > 0.0 { *slope } else { slope.max(0.0) };
             }
             let square: f64 = slopes.iter().map(|slope| slope * slope).sum();
@@ -224,7 +256,7 @@ impl Relaxation<'_> {
                 return;
             }
             let step = length * (state.cost - answer.bound) / square;
-            for (price, slope) in prices.values.iter_mut().zip(&slopes) {
+            for (price, slope) in prices.iter_mut().zip(&slopes) {
                 *price = (*price + step * slope).max(0.0);
             }
         }
@@ -244,23 +276,24 @@ impl Relaxation<'_> {
             let exact = self.spread(&groups, &optimum, Some(&state.prices));
             let even = self.spread(&groups, &optimum, None);
             let mut between = exact.clone();
-            between.values.iter_mut().zip(&state.prices.values).for_each(|(x, y)| *x = 0.5 * (*x + y));
+            between.iter_mut().zip(&state.prices).for_each(|(x, y)| *x = 0.5 * (*x + y));
             let (known, cost) = (state.pool.paths.len(), optimum.cost);
             for prices in [&between, &exact, &even] {
                 self.answer(prices, &mut state);
             }
             mixture = Some(optimum);
             // Shares of the first paths stay valid when more are added. No new path can only mean rounding.
-            let done = cost - state.bound <= self.tolerance || self.met(&state);
+            let done = cost - state.bound <= self.tolerance(cost) || self.met(&state);
             if done || state.pool.paths.len() == known {
                 break;
             }
         }
         match mixture {
-            Some(optimum) if optimum.cost < state.cost - self.tolerance => {
+            Some(optimum) if optimum.cost < state.cost - self.tolerance(state.cost) => {
                 let shares = optimum.shares.iter().zip(state.pool.paths).filter(|(share, _)| **share > 0.0);
                 let shares = shares.map(|(share, (object, path))| Share { object, path, share: *share });
-                Solution { shares: shares.collect(), gap: (optimum.cost - state.bound).max(0.0) }
+                let (cost, gap) = (optimum.cost, (optimum.cost - state.bound).max(0.0));
+                Solution { shares: shares.collect(), cost, gap }
             }
             _ => state.whole(),
         }
@@ -274,7 +307,9 @@ impl Relaxation<'_> {
             self.chains.iter().map(|chain| chain.best(&state.prices, &mut state.memory).0).collect();
         let mut pool = Pool { paths: Vec::new(), known: HashMap::new() };
         for (number, (object, path)) in state.pool.paths.iter().enumerate() {
-            let cost = self.chains[*object].cost(path) + state.prices.along(path);
+            let chain = &self.chains[*object];
+            let paid: f64 = chain.uses(path).into_iter().map(|place| state.prices[place]).sum();
+            let cost = chain.cost(path) + paid;
             if number < self.chains.len()
                 || cost - cheapest[*object] <= limit
                 || *path == state.paths[*object]
@@ -299,11 +334,9 @@ impl Relaxation<'_> {
     /// Uses of a track at a step that the same paths make, as places of their prices: one condition stands for all. Uses by one
     /// object alone need none.
     fn groups(&self, pool: &Pool) -> Vec<(Vec<usize>, Vec<usize>)> {
-        let mut users: Vec<Vec<usize>> = vec![Vec::new(); self.tracks * self.steps];
-        for (number, (_, path)) in pool.paths.iter().enumerate() {
-            for (step, &track) in path.iter().enumerate().filter(|(_, track)| **track != NONE) {
-                users[track as usize * self.steps + step].push(number);
-            }
+        let mut users: Vec<Vec<usize>> = vec![Vec::new(); self.places];
+        for (number, (object, path)) in pool.paths.iter().enumerate() {
+            self.chains[*object].uses(path).into_iter().for_each(|place| users[place].push(number));
         }
         let mut groups: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
         let mut known: HashMap<Vec<usize>, usize> = HashMap::new();
@@ -337,15 +370,15 @@ impl Relaxation<'_> {
         &self,
         groups: &[(Vec<usize>, Vec<usize>)],
         optimum: &Optimum,
-        model: Option<&Prices>,
-    ) -> Prices {
-        let mut prices = Prices::new(self.tracks, self.steps);
+        model: Option<&Vec<f64>>,
+    ) -> Vec<f64> {
+        let mut prices = vec![0.0; self.places];
         for ((_, places), price) in groups.iter().zip(&optimum.prices) {
-            let weight = |place: &usize| model.map_or(1.0, |model| model.values[*place]);
+            let weight = |place: &usize| model.map_or(1.0, |model| model[*place]);
             let total: f64 = places.iter().map(weight).sum();
             for place in places {
                 let part = if total > 0.0 { weight(place) / total } else { 1.0 / places.len() as f64 };
-                prices.values[*place] = price * part;
+                prices[*place] = price * part;
             }
         }
         prices
@@ -356,14 +389,6 @@ impl State {
     fn whole(self) -> Solution {
         let paths = self.paths.into_iter().enumerate();
         let shares = paths.map(|(object, path)| Share { object, path, share: 1.0 }).collect();
-        Solution { shares, gap: (self.cost - self.bound).max(0.0) }
-    }
-}
-
-/// Takes the uses of a path out of reach, or gives them their price again.
-fn block(blocked: &mut Prices, prices: &Prices, path: &Path, taken: bool) {
-    for (step, &track) in path.iter().enumerate().filter(|(_, track)| **track != NONE) {
-        let place = prices.place(track, step);
-        blocked.values[place] = if taken { f64::INFINITY } else { prices.values[place] };
+        Solution { shares, cost: self.cost, gap: (self.cost - self.bound).max(0.0) }
     }
 }

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use proptest::prelude::*;
 
-use super::chain::{Chain, NONE};
+use super::chain::{Chain, NONE, Near};
 use super::relaxation::{Relaxation, Solution};
 use super::*;
 use crate::metric::Gospa;
@@ -207,13 +207,74 @@ fn nothing_against_nothing_is_zero_and_against_something_its_price() {
 }
 
 #[test]
+fn totals_are_right_for_orders_and_cut_offs_whose_powers_overflow_or_vanish() {
+    let off = |y: f64| [line(0.0, 0..5), line(y, 0..5)];
+    for (cutoff, order) in
+        [(100.0, 8.0), (1000.0, 150.0), (1e5, 1000.0), (1e-3, 150.0), (1e200, 2.0), (1e-200, 2.0)]
+    {
+        let metric = metric(cutoff, order, 0.5 * cutoff);
+        let close = |score: TrajectoryGospaScore, expected: f64| {
+            let share = score.total / expected;
+            assert!(
+                (share - 1.0).abs() < 1e-9,
+                "{share} of {expected:e} at cut-off {cutoff:e}, order {order}"
+            );
+            assert!(score.gap <= 1e-9 * score.parts.sum(), "gap {:e} of {:e}", score.gap, score.parts.sum());
+        };
+        let error = 1e-3 * cutoff;
+        let [truth, track] = off(error);
+        assert_eq!(metric.score::<2>(&[], &[]).unwrap().parts.sum(), 0.0);
+        close(metric.score(&[truth.clone()], &[track.clone()]).unwrap(), error * 5f64.powf(order.recip()));
+        close(metric.score(&[truth.clone()], &[]).unwrap(), cutoff * 2.5f64.powf(order.recip()));
+        // Of two tracks for two objects each takes the nearer, however small the power of both.
+        let pair =
+            metric.score(&[truth.clone(), line(error, 0..5)], &[line(2.0 * error, 0..5), truth]).unwrap();
+        close(pair, error * 5f64.powf(order.recip()));
+    }
+}
+
+#[test]
+fn a_switch_that_no_gain_can_pay_is_never_made() {
+    let score =
+        metric(10.0, 150.0, 1e9).score(&[line(0.0, 0..10)], &[line(1.0, 0..6), line(1.0, 6..10)]).unwrap();
+    assert_eq!((score.switches, score.parts.switches), (0.0, 0.0));
+    assert!((score.total - 10.0 * 4f64.powf(1.0 / 150.0)).abs() < 1e-9, "{}", score.total);
+}
+
+#[test]
+fn a_track_that_is_kept_before_or_beyond_its_meetings_is_free_only_if_nobody_else_has_it_then() {
+    // The track meets the first object early and the second one late; a third trajectory never comes near.
+    let track = Trajectory::new(0, (0..30).map(|t| [t as f64, 0.0]));
+    let early = Trajectory::new(5, (5..8).map(|t| [t as f64, 1.0]));
+    let late = Trajectory::new(20, (20..24).map(|t| [t as f64, 1.0]));
+    let metric = metric(10.0, 1.0, 3.0);
+    let alone = metric.score(&[early.clone()], &[track.clone()]).unwrap();
+    assert_eq!((alone.switches, alone.parts.localisation), (0.0, 3.0));
+    let both = metric.score(&[early, late, line(500.0, 0..30)], &[track]).unwrap();
+    assert_eq!((both.switches, both.parts.localisation), (1.0, 7.0));
+}
+
+#[test]
 fn positions_and_parameters_out_of_range_are_refused() {
     assert!(TrajectoryGospa::new(10.0, 1.0, 0.0).is_err());
     assert!(TrajectoryGospa::new(10.0, 0.5, 1.0).is_err());
     assert!(TrajectoryGospa::new(f64::NAN, 1.0, 1.0).is_err());
-    assert!(metric(1e200, 2.0, 1.0).score::<2>(&[], &[]).is_err());
     let bad = Trajectory::new(0, [[f64::NAN, 0.0]]);
     assert!(metric(10.0, 1.0, 1.0).score(&[bad], &[]).is_err());
+}
+
+/// An object that saves this with each track at each step.
+fn chain(gains: &[&[f64]], change: f64) -> Chain {
+    const ALONE: f64 = 4.0;
+    let steps = gains[0].len();
+    let near = |(track, gains): (usize, &&[f64])| Near {
+        track: track as u32,
+        first: 0,
+        place: track * steps,
+        costs: gains.iter().map(|gain| ALONE - gain).collect(),
+    };
+    let near = gains.iter().enumerate().map(near).collect();
+    Chain { steps: 0..steps, alone: vec![ALONE; steps], near, change }
 }
 
 /// Gains of `objects` x `tracks` x `steps`, of which many are zero and many are equal.
@@ -222,14 +283,9 @@ fn cluster() -> impl Strategy<Value = (Vec<Chain>, usize, usize)> {
         let gain = prop_oneof![3 => Just(0.0), 2 => (1i32..4).prop_map(f64::from), 1 => 0.0..4.0];
         let gains = prop::collection::vec(gain, objects * tracks * steps);
         (gains, 0.1..3.0).prop_map(move |(gains, change)| {
-            let chain = |object: usize| Chain {
-                gains: (0..tracks)
-                    .map(|track| (track as u32, gains[(object * tracks + track) * steps..][..steps].to_vec()))
-                    .collect(),
-                change,
-                steps,
-            };
-            ((0..objects).map(chain).collect(), tracks, steps)
+            let gains_of = |object: usize| gains[object * tracks * steps..][..tracks * steps].chunks(steps);
+            let chains = (0..objects).map(|object| chain(&gains_of(object).collect::<Vec<_>>(), change));
+            (chains.collect(), tracks, steps)
         })
     })
 }
@@ -243,7 +299,7 @@ proptest! {
 
     #[test]
     fn the_linear_programme_alone_finds_what_the_climb_finds((chains, tracks, steps) in cluster()) {
-        let solve = |climbs| Relaxation { chains: &chains, tracks, steps, tolerance: 1e-9, climbs }.solve();
+        let solve = |climbs| Relaxation { chains: &chains, tracks, places: tracks * steps, tolerance: 1e-9, climbs }.solve();
         let (climbed, programmed) = (solve(100), solve(0));
         prop_assert!(climbed.gap <= 1e-9 && programmed.gap <= 1e-9, "gaps {} and {}", climbed.gap, programmed.gap);
         prop_assert!((cost(&chains, &climbed) - cost(&chains, &programmed)).abs() <= 2e-9);
@@ -262,17 +318,13 @@ proptest! {
 
 #[test]
 fn where_half_weights_are_cheaper_than_any_whole_paths_they_are_taken() {
-    let chain = |first: [f64; 3], second: [f64; 3]| Chain {
-        gains: vec![(0, first.to_vec()), (1, second.to_vec())],
-        change: 0.45,
-        steps: 3,
-    };
+    let chain = |first: [f64; 3], second: [f64; 3]| chain(&[&first, &second], 0.45);
     let chains = [
         chain([0.0, 0.3, 0.0], [0.0, 2.0, 1.0]),
         chain([0.8, 3.0, 0.0], [1.0, 2.0, 0.0]),
         chain([0.0, 3.2, 0.0], [1.0, 0.0, 2.0]),
     ];
-    let solution = Relaxation { chains: &chains, tracks: 2, steps: 3, tolerance: 1e-9, climbs: 100 }.solve();
+    let solution = Relaxation { chains: &chains, tracks: 2, places: 6, tolerance: 1e-9, climbs: 100 }.solve();
     assert!(solution.shares.iter().all(|one| (one.share - 0.5).abs() < 1e-9) && solution.gap < 1e-9);
     let paths: Vec<Vec<u32>> =
         (0..27).map(|k| [k % 3, k / 3 % 3, k / 9].map(|t| [NONE, 0, 1][t]).to_vec()).collect();

@@ -1,24 +1,22 @@
 //! The picture of a recording: tables turned into compact columns for the page.
 
+mod budget;
 mod plots;
 mod tracks;
+mod truths;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use serde::Serialize;
-use tercel_data::table::{Detections, Status, Tracks, Truth, Truths};
+use tercel_data::table::{Detections, Status, Tracks, Truths};
 
+use self::budget::{Budget, DRAWN_TIMES, stride};
 use self::plots::Plots;
 use self::tracks::{TrackColumns, columns_of_tracks};
+use self::truths::{TruthColumns, columns_of_truths, count_objects};
 use super::chart::ChartData;
 use super::number::Number;
 use super::{Chart, Form, ReportError};
-
-/// More detections than this are thinned for drawing: a page has to stay quick.
-const DRAWN_DETECTIONS: usize = 200_000;
-
-/// More rows of tracks than this are thinned for drawing.
-const DRAWN_TRACK_ROWS: usize = 300_000;
 
 /// A recording in plan view: detections, tracks with their 2-sigma ellipses, and truth, with a time slider.
 ///
@@ -49,19 +47,6 @@ pub struct SensorNote {
     pub position: Option<[f64; 2]>,
 }
 
-/// One true object, in the order of time.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct TruthColumns {
-    name: String,
-    t: Vec<Number>,
-    x: Vec<Number>,
-    y: Vec<Number>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    vx: Vec<Number>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    vy: Vec<Number>,
-}
-
 /// The picture as the page reads it.
 #[derive(Serialize)]
 pub(super) struct PictureData<'a> {
@@ -87,20 +72,23 @@ impl Picture {
         truths: Option<&Truths>,
         sensors: &[SensorNote],
     ) -> Result<Picture, ReportError> {
-        let times = slider_times(detections, tracks, truths);
+        let times = times_of(detections, tracks, truths);
         let start = times.first().copied().unwrap_or(0.0);
         let mut notes = Vec::new();
-        let plots = Plots::of(detections, sensors, start, DRAWN_DETECTIONS, &mut notes);
+        let budget = Budget::of(detections, tracks, truths);
+        let plots = Plots::of(detections, sensors, start, budget.detections, &mut notes);
         let reports = report_times(detections, tracks);
-        let columns = columns_of_tracks(tracks, start, &reports, DRAWN_TRACK_ROWS, &mut notes)?;
+        let columns = columns_of_tracks(tracks, start, &reports, budget.track_rows, &mut notes)?;
+        let objects = truths
+            .map_or_else(Vec::new, |truths| columns_of_truths(truths, start, budget.truth_rows, &mut notes));
         let counted = if reports.is_empty() { &times } else { &reports };
         Ok(Picture {
             start,
-            times: times.iter().map(|time| Number::milli(time - start)).collect(),
+            times: stops(&times, &mut notes).map(|time| Number::milli(time - start)).collect(),
             plots,
             modes: tracks.modes.clone(),
             tracks: columns,
-            truths: truths.map_or_else(Vec::new, |truths| columns_of_truths(truths, start)),
+            truths: objects,
             notes,
             charts: Vec::new(),
             counts: (!times.is_empty()).then(|| count_chart(counted, tracks, truths)),
@@ -142,14 +130,23 @@ impl Picture {
     }
 }
 
-/// The times at which the slider stops: those of scans and tracks; those of the truth if there is nothing else.
-fn slider_times(detections: &Detections, tracks: &Tracks, truths: Option<&Truths>) -> Vec<f64> {
+/// The times of a recording: those of scans and tracks; those of the truth if there is nothing else.
+fn times_of(detections: &Detections, tracks: &Tracks, truths: Option<&Truths>) -> Vec<f64> {
     let scans = detections.scans.iter().map(|scan| scan.time);
     let times = sorted_times(scans.chain(tracks.rows.iter().map(|row| row.time)));
     if !times.is_empty() {
         return times;
     }
     sorted_times(truths.iter().flat_map(|truths| &truths.rows).map(|row| row.time))
+}
+
+/// The times at which the slider stops: an even share when there are very many, and always the last.
+fn stops<'a>(times: &'a [f64], remarks: &mut Vec<String>) -> impl Iterator<Item = f64> + 'a {
+    let (stride, last) = (stride(times.len(), DRAWN_TIMES), times.len().saturating_sub(1));
+    if stride > 1 {
+        remarks.push(format!("The slider stops at one in {stride} of {} times.", times.len()));
+    }
+    times.iter().enumerate().filter(move |(i, _)| i % stride == 0 || *i == last).map(|(_, time)| *time)
 }
 
 /// The times at which a tracker told its tracks: those of the scans of sensors that it reported on, so that a scan
@@ -190,41 +187,4 @@ fn count_chart(times: &[f64], tracks: &Tracks, truths: Option<&Truths>) -> Chart
         Some(truths) => chart.with_part("true objects", count_objects(times, truths)),
         None => chart,
     }
-}
-
-/// How many true objects are there at each time: an object is there from its first row to its last.
-fn count_objects(times: &[f64], truths: &Truths) -> Vec<f64> {
-    let mut lives: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
-    for row in truths.rows.iter().filter(|row| row.time.is_finite()) {
-        let life = lives.entry(&row.object).or_insert((row.time, row.time));
-        *life = (life.0.min(row.time), life.1.max(row.time));
-    }
-    let alive = |time: f64| lives.values().filter(|(first, last)| (*first..=*last).contains(&time)).count();
-    times.iter().map(|&time| alive(time) as f64).collect()
-}
-
-fn columns_of_truths(truths: &Truths, start: f64) -> Vec<TruthColumns> {
-    let mut objects: BTreeMap<&str, Vec<&Truth>> = BTreeMap::new();
-    for row in truths.rows.iter().filter(|row| row.time.is_finite()) {
-        objects.entry(&row.object).or_default().push(row);
-    }
-    let columns = |(name, mut rows): (&str, Vec<&Truth>)| {
-        rows.sort_by(|a, b| a.time.total_cmp(&b.time));
-        let column =
-            |value: &dyn Fn(&Truth) -> f64| rows.iter().map(|row| Number::milli(value(row))).collect();
-        let moving = rows.iter().any(|row| row.velocity.is_some());
-        let speed = |axis: usize| match moving {
-            true => column(&|row| row.velocity.map_or(f64::NAN, |velocity| velocity[axis])),
-            false => Vec::new(),
-        };
-        TruthColumns {
-            name: name.to_owned(),
-            t: column(&|row| row.time - start),
-            x: column(&|row| row.position[0]),
-            y: column(&|row| row.position[1]),
-            vx: speed(0),
-            vy: speed(1),
-        }
-    };
-    objects.into_iter().map(columns).collect()
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use tercel_data::table::{Detection, Detections, Observation, Scan};
 
 use super::SensorNote;
+use super::budget::stride;
 use crate::report::number::{Id, Number};
 
 /// Sensors, scans and detections of a recording, in columns that follow each other scan by scan.
@@ -69,7 +70,7 @@ impl Plots {
         remarks: &mut Vec<String>,
     ) -> Plots {
         let total: usize = detections.scans.iter().map(|scan| scan.detections.len()).sum();
-        let stride = total.div_ceil(limit).max(1);
+        let stride = stride(total, limit);
         let mut scans: Vec<&Scan> = detections.scans.iter().filter(|scan| scan.time.is_finite()).collect();
         scans.sort_by(|a, b| a.time.total_cmp(&b.time));
         let mut filling = Filling { stride, ..Filling::default() };
@@ -109,6 +110,10 @@ impl<'a> Filling<'a> {
             self.detection(detection, position.unwrap_or_default());
         }
         self.plots.sensors[sensor].count += scan.detections.len();
+        // Of a thinned recording, scans of which nothing is drawn would only take room.
+        if self.stride > 1 && self.plots.detections.id.len() == before {
+            return;
+        }
         let columns = &mut self.plots.scans;
         columns.t.push(Number::milli(scan.time - start));
         columns.s.push(sensor);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tercel_data::table::{Status, Track, Tracks};
 
+use super::budget::{keep_longest, stride};
 use crate::report::ReportError;
 use crate::report::number::{Id, Number};
 
@@ -69,8 +70,9 @@ pub(super) fn columns_of_tracks(
         return Ok(Vec::new());
     }
     let layout = Layout::of(&tracks.labels)?;
+    keep_longest(&mut lives, "tracks", remarks);
     let rows = tracks.rows.len();
-    let stride = rows.div_ceil(limit).max(1);
+    let stride = stride(rows, limit);
     if stride > 1 {
         remarks.push(format!("One in {stride} of {rows} rows of tracks is drawn."));
     }
@@ -129,10 +131,14 @@ fn columns(id: u64, mut life: Vec<&Track>, frame: &Frame<'_>) -> Result<TrackCol
     })
 }
 
-/// Every `stride`-th row, and besides them the first, the last and those where the status changes.
+/// Every `stride`-th row, and besides them the first, the last and those where a track is confirmed or deleted.
 fn thinned<'a>(life: &[&'a Track], stride: usize) -> Vec<&'a Track> {
+    let standing = |row: &Track| match row.status {
+        Status::Confirmed | Status::Coasted => Status::Confirmed,
+        other => other,
+    };
     let kept = |(i, _): &(usize, &&Track)| {
-        let changes = |j: usize| life[j].status != life[j - 1].status;
+        let changes = |j: usize| standing(life[j]) != standing(life[j - 1]);
         let ends = *i == 0 || *i + 1 == life.len();
         ends || i % stride == 0 || changes(*i) || changes(*i + 1)
     };
