@@ -9,11 +9,12 @@ use std::io::Write;
 
 use proptest::collection::vec;
 use proptest::prelude::*;
-use tercel_data::import::{adsb, ais, autoferry};
+use tercel_data::import::autoferry;
 use tercel_data::ndjson::Scans;
 use tercel_data::{
-    Format, ImportOptions, ReadOptions, read_detections_from, read_metrics_from, read_tracks_from,
-    read_truths_from, write_detections_to, write_metrics_to, write_tracks_to, write_truths_to,
+    Format, ImportOptions, ReadOptions, Source, import_from, read_detections_from, read_metrics_from,
+    read_tracks_from, read_truths_from, write_detections_to, write_metrics_to, write_tracks_to,
+    write_truths_to,
 };
 
 const FORMATS: [Format; 3] = [Format::Csv, Format::Parquet, Format::Ndjson];
@@ -33,8 +34,9 @@ fn read_as_everything(bytes: &[u8]) {
     }
     let _ = autoferry::read_detections_from(bytes, "noise");
     let _ = autoferry::read_truths_from(bytes, "noise");
-    let _ = adsb::read_from(bytes, "noise", &ImportOptions::default());
-    let _ = ais::read_from(bytes, "noise", &ImportOptions::default());
+    for source in Source::ALL {
+        let _ = import_from(source, bytes, "noise", &ImportOptions::default());
+    }
 }
 
 /// Changes of a file: bytes that are replaced, and where it ends.
