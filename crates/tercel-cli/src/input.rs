@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, Format, ImportOptions, Imported, ReadOptions, Source, import, read_detections_from, read_truths,
+    Angles, ImportOptions, Imported, OnError, ReadOptions, Source, import, import_from, read_truths,
 };
 
 use crate::console::Console;
@@ -56,7 +56,7 @@ impl ReadArguments {
             AngleUnit::Degrees => Angles::Degrees,
             AngleUnit::Radians => Angles::Radians,
         };
-        ReadOptions { angles, sensor: self.sensor.as_deref().map(Into::into), columns: self.columns.clone() }
+        ReadOptions { angles, sensor: self.sensor.as_deref().map(Into::into), columns: self.columns.clone(), on_error: OnError::Fail }
     }
 
     /// The source of a file: the one that was named, or the one that it looks like.
@@ -79,24 +79,9 @@ impl ReadArguments {
         let _progress = Progress::spinner(console, "reading");
         let options = ImportOptions { read: self.options(), ..options };
         match paths {
-            [path] if is_stdin(path.as_ref()) => self.import_stdin(source),
+            [path] if is_stdin(path.as_ref()) => Ok(import_from(source, std::io::stdin(), STDIN, &options)?),
             _ => Ok(import(source, paths, &options)?),
         }
-    }
-
-    fn import_stdin(&self, source: Source) -> Result<Imported, Failure> {
-        let format = match source {
-            Source::Csv => Format::Csv,
-            Source::Parquet => Format::Parquet,
-            Source::Ndjson => Format::Ndjson,
-            other => {
-                let message =
-                    format!("a recording of the kind `{}` cannot come from standard input", other.name());
-                return Err(Failure::usage(message));
-            }
-        };
-        let detections = read_detections_from(std::io::stdin(), format, STDIN, &self.options())?;
-        Ok(Imported { detections, ..Imported::default() })
     }
 }
 

@@ -165,7 +165,7 @@ fn the_second_of_the_minute_is_never_a_time() {
 fn a_bad_row_is_refused_with_the_way_out_which_counts_it() {
     for (name, rows, problem, reason) in [
         ("ais_one_garbage_row.csv", 48, "95.2", "`LAT` is not degrees in [-90, 90]"),
-        ("ais_cut_last_line.csv", 47, "the last line is cut", "the last line is cut"),
+        ("ais_cut_last_line.csv", 48, "the last line is cut", "the last line is cut"),
     ] {
         let error = import(Source::Ais, &[path(name)], &ImportOptions::default()).unwrap_err();
         assert!(error.to_string().contains(problem), "{error}");

@@ -22,7 +22,8 @@
 //!   [`ImportOptions::all_stations`](super::ImportOptions) is set. The number, the kind or the message tells.
 //! - A speed of 102.3 knots or a course of 360° is "not available", and so is the speed or course of a report whose other
 //!   half is.
-//! - The same report from another receiver is left out and counted: one of the same ship within a second and 10 m.
+//! - The same report from another receiver is left out and counted: one of the same ship at the same time within 10 m, or
+//!   within a second and 2 m.
 //!
 //! Each report becomes a detection of the sensor `ais` whose `identity` is the MMSI. Ships are placed on the ellipsoid and
 //! have no `z`.

@@ -117,16 +117,18 @@ impl Framing {
 
 /// True when a report is one before it of the same object, heard by another receiver.
 pub(super) fn same_report(before: &Report, report: &Report, family: &Family) -> bool {
+    /// An object cannot be at two places, m.
+    const AT_ONE_TIME: f64 = 10.0;
     /// Metres in a radian of latitude.
     const RADIAN: f64 = 6_371_000.0;
-    let (within, apart) = family.same;
     let later = (report.time - before.time).abs();
     if later > 1.0 {
         return false;
     }
+    let apart = if later == 0.0 { AT_ONE_TIME } else { family.rounding };
     let north = report.latitude - before.latitude;
     let east = (report.longitude - before.longitude) * report.latitude.cos();
-    (north == 0.0 && east == 0.0) || (later <= within && north.hypot(east) * RADIAN <= apart)
+    north.hypot(east) * RADIAN <= apart
 }
 
 /// Velocity in the local frame: north at the object is not quite north at the origin.

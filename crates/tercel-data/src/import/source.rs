@@ -43,16 +43,16 @@ pub(super) enum Kind {
 pub(super) struct Family {
     /// Name of the sensor, and of the source in the description of a recording.
     pub sensor: &'static str,
-    /// Two reports of one object are the same, heard by two receivers, if they are at most so far apart: s, and m. Those of
-    /// one position are the same within a second, of whatever family.
-    pub same: (f64, f64),
+    /// Two reports of one object within a second are the same, heard by two receivers, if they are at most so far apart, m:
+    /// as far as receivers round.
+    pub rounding: f64,
 }
 
-/// Ships send every two seconds at most, and then move further than this. Receivers stamp whole seconds.
-const SHIPS: Family = Family { sensor: "ais", same: (1.0, 10.0) };
+/// Ships send every two seconds at most.
+const SHIPS: Family = Family { sensor: "ais", rounding: 2.0 };
 
-/// Aircraft send twice a second.
-const AIRCRAFT: Family = Family { sensor: "adsb", same: (0.0, 10.0) };
+/// Aircraft send twice a second, also when they stand.
+const AIRCRAFT: Family = Family { sensor: "adsb", rounding: 0.0 };
 
 /// All sources, in the order in which help texts list them.
 const SOURCES: [(Source, &str, Kind); 10] = [

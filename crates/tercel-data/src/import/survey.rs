@@ -14,6 +14,8 @@ use crate::table::Origin;
 #[derive(Debug, Default)]
 pub(super) struct Survey {
     positions: Sample<[f64; 2]>,
+    /// Time and longitude of the earliest report.
+    earliest: Option<(f64, f64)>,
     intervals: Sample<f64>,
     /// How often a report was before the last one of its object.
     back: u64,
@@ -55,6 +57,9 @@ impl Survey {
 
     fn add(&mut self, report: Report, family: &Family) {
         self.positions.add([report.latitude, report.longitude]);
+        if self.earliest.is_none_or(|(time, _)| report.time < time) {
+            self.earliest = Some((report.time, report.longitude));
+        }
         let Some(object) = &report.object else { return };
         let time = report.time;
         match self.objects.get_mut(object) {
@@ -83,7 +88,7 @@ impl Survey {
     /// The median position of the reports, on the ellipsoid.
     pub fn middle(&self) -> Option<Origin> {
         // Longitudes near the date line are turned so that they do not fall apart.
-        let first = self.positions.kept.first()?[1];
+        let (_, first) = self.earliest?;
         let near = |longitude: f64| first + wrapped(longitude - first);
         let all = || self.positions.kept.iter();
         let latitude = median(all().map(|position| position[0]).collect())?;

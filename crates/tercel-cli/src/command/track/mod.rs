@@ -186,11 +186,11 @@ impl TrackArguments {
             let (config, pipeline) = config::read(path)?;
             return Ok((config, pipeline, path.to_string_lossy().into_owned()));
         }
-        let name = match source {
+        let name = match source.family() {
             Source::Autoferry => "harbour",
             Source::Adsb => "adsb",
             Source::Ais => "ais",
-            Source::Csv | Source::Parquet | Source::Ndjson => "default",
+            _ => "default",
         };
         console.note(format_args!(
             "using the configuration `{name}`; `tercel config init --preset {name} -o FILE` writes it for changes"
