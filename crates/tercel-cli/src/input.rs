@@ -32,6 +32,9 @@ pub struct ReadArguments {
     /// Name of the sensor, for a detection table that does not name one.
     #[arg(long, value_name = "NAME")]
     pub sensor: Option<String>,
+    /// Keep base stations, aids to navigation and aircraft among the ships (ais, nmea).
+    #[arg(long)]
+    pub all_stations: bool,
 }
 
 /// A unit of angles.
@@ -77,7 +80,7 @@ impl ReadArguments {
         console: &Console,
     ) -> Result<Imported, Failure> {
         let _progress = Progress::spinner(console, "reading");
-        let options = ImportOptions { read: self.options(), ..options };
+        let options = ImportOptions { read: self.options(), all_stations: self.all_stations, ..options };
         match paths {
             [path] if is_stdin(path.as_ref()) => Ok(import_from(source, std::io::stdin(), STDIN, &options)?),
             _ => Ok(import(source, paths, &options)?),

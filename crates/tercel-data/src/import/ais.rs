@@ -109,7 +109,8 @@ pub(super) struct Ships {
 impl Ships {
     /// Begins to read; the times are looked at before.
     pub fn new(input: &Input, options: &ImportOptions) -> Result<Self, DataError> {
-        let table = Table::open(input, &NAMES)?;
+        let open = || Table::open(input, &NAMES, &options.read);
+        let table = open()?;
         let needed = [&SHIP, &LATITUDE, &LONGITUDE];
         let missing: Vec<&Names> = needed.into_iter().filter(|names| !table.field(names).present()).collect();
         if !missing.is_empty() {
@@ -117,7 +118,7 @@ impl Ships {
         }
         let danish = table.columns().any(|column| plain(&column.name) == "typeofmobile");
         let order = options.date_order.or(danish.then_some(DateOrder::DayFirst));
-        let clock = input.clock(|| clock::settle(Table::open(input, &NAMES)?, &TIME, order))?;
+        let clock = input.clock(|| clock::settle(open()?, &TIME, order))?;
         let field = |names| table.field(names);
         Ok(Ships {
             time: table.column(&clock.column),

@@ -9,6 +9,7 @@ use super::table::{Names, PLAIN, Shape, Table};
 use super::{Source, adsb, ais, autoferry};
 use crate::error::{DataError, Place};
 use crate::format::{Format, file_name};
+use crate::options::ReadOptions;
 
 /// Columns that only our own tables have.
 const CANONICAL: Names = Names(&[(PLAIN, &["x", "bearing", "detections"])]);
@@ -67,7 +68,7 @@ impl Source {
 fn by_columns(input: &Input) -> Option<Source> {
     let wanted: Vec<&Names> =
         ais::NAMES.into_iter().chain(adsb::NAMES).chain([&CANONICAL, &SENSOR]).collect();
-    let table = Table::open(input, &wanted).ok()?;
+    let table = Table::open(input, &wanted, &ReadOptions::default()).ok()?;
     let has = |names| table.field(names).present();
     let place = has(&adsb::LATITUDE) || has(&adsb::POSITION);
     if has(&CANONICAL) {
@@ -84,5 +85,5 @@ fn by_columns(input: &Input) -> Option<Source> {
 /// True when rows have a time, or the first line describes a table of ours.
 fn has_time(input: &Input) -> bool {
     const TIME: Names = Names(&[(PLAIN, &["time", "tercel"])]);
-    Table::open(input, &[]).is_ok_and(|table| table.field(&TIME).present())
+    Table::open(input, &[], &ReadOptions::default()).is_ok_and(|table| table.field(&TIME).present())
 }

@@ -127,7 +127,7 @@ pub(super) struct Aircraft {
 impl Aircraft {
     /// Begins to read; times and altitudes are looked at before.
     pub fn new(input: &Input, options: &ImportOptions) -> Result<Self, DataError> {
-        let open = || Table::open(input, &NAMES);
+        let open = || Table::open(input, &NAMES, &options.read);
         let table = open()?;
         let field = |names| table.field(names);
         let (latitude, longitude, position) = (field(&LATITUDE), field(&LONGITUDE), field(&POSITION));

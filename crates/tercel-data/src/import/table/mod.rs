@@ -14,6 +14,7 @@ pub(super) use self::names::{
 };
 use super::input::{Content, Input};
 use crate::error::{DataError, Place, Refusal};
+use crate::options::ReadOptions;
 
 /// One cell of a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,11 +75,11 @@ pub(super) struct Table {
 
 impl Table {
     /// Begins to read a table. Of a file that is read by columns only those under a `wanted` name are.
-    pub fn open(input: &Input, wanted: &[&Names]) -> Result<Self, DataError> {
+    pub fn open(input: &Input, wanted: &[&Names], options: &ReadOptions) -> Result<Self, DataError> {
         let rows: Box<dyn Rows> = match input.content()? {
             Content::Parquet => Box::new(parquet::ParquetRows::new(input, wanted)?),
             Content::Json(shape) => Box::new(json::JsonRows::new(input, shape)?),
-            _ => Box::new(text::TextRows::new(input)?),
+            _ => Box::new(text::TextRows::new(input, options)?),
         };
         let plain = rows.names().iter().map(|name| names::plain(name)).collect();
         Ok(Table { rows, plain, file: Arc::clone(&input.name) })

@@ -24,6 +24,8 @@ use crate::source::read_error;
 /// The rows of a Parquet file. Its bytes are held in memory, its rows batch by batch.
 pub(super) struct ParquetRows {
     names: Vec<String>,
+    /// For each column of the file, which one of a batch it is, if it is read.
+    chosen: Vec<Option<usize>>,
     batches: ParquetRecordBatchReader,
     columns: Vec<Column>,
     /// Row of the batch, and rows of the batches before.
@@ -55,20 +57,25 @@ impl ParquetRows {
             let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, skip)?;
             let names: Vec<String> =
                 builder.schema().fields().iter().map(|field| field.name().clone()).collect();
-            let chosen: Vec<usize> = (0..names.len())
-                .filter(|column| wanted.iter().any(|wanted| wanted.has(&names[*column])))
-                .collect();
-            let mask = ProjectionMask::roots(builder.parquet_schema(), chosen.iter().copied());
+            let is_wanted = |name: &String| wanted.iter().any(|wanted| wanted.has(name));
+            let read: Vec<usize> = (0..names.len()).filter(|column| is_wanted(&names[*column])).collect();
+            let chosen =
+                (0..names.len()).map(|column| read.iter().position(|read| *read == column)).collect();
+            let mask = ProjectionMask::roots(builder.parquet_schema(), read);
             let batches = builder.with_batch_size(8192).with_projection(mask).build()?;
-            Ok::<_, parquet::errors::ParquetError>((
-                chosen.into_iter().map(|column| names[column].clone()).collect(),
-                batches,
-            ))
+            Ok::<_, parquet::errors::ParquetError>((names, chosen, batches))
         });
         match opened {
-            Some(Ok((names, batches))) => {
-                Ok(ParquetRows { names, batches, columns: Vec::new(), row: 0, length: 0, before: 0, file })
-            }
+            Some(Ok((names, chosen, batches))) => Ok(ParquetRows {
+                names,
+                chosen,
+                batches,
+                columns: Vec::new(),
+                row: 0,
+                length: 0,
+                before: 0,
+                file,
+            }),
             Some(Err(error)) => Err(corrupt(&file, error)),
             None => Err(corrupt(&file, "its parts contradict each other")),
         }
@@ -157,7 +164,8 @@ impl super::Rows for ParquetRows {
     }
 
     fn cell(&self, column: usize) -> Cell<'_> {
-        self.columns.get(column).map_or(Cell::Nothing, |cells| cells.cell(self.row))
+        let read = self.chosen.get(column).copied().flatten();
+        read.and_then(|read| self.columns.get(read)).map_or(Cell::Nothing, |cells| cells.cell(self.row))
     }
 
     fn place(&self) -> Place {

@@ -7,6 +7,7 @@ use super::super::input::Input;
 use super::Cell;
 use crate::error::{DataError, Place};
 use crate::format::csv;
+use crate::options::ReadOptions;
 
 /// The rows of a text table.
 pub(super) struct TextRows {
@@ -17,9 +18,9 @@ pub(super) struct TextRows {
 }
 
 impl TextRows {
-    pub fn new(input: &Input) -> Result<Self, DataError> {
+    pub fn new(input: &Input, options: &ReadOptions) -> Result<Self, DataError> {
         let file = Arc::clone(&input.name);
-        let rows = csv::Rows::new(input.open()?, &file, None)?;
+        let rows = csv::Rows::new(input.open()?, &file, options.columns.as_deref())?;
         let names = rows.named(&file)?.to_vec();
         Ok(TextRows { rows, names, line: 0, file })
     }
