@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, Format, ImportOptions, Imported, ReadOptions, Source, import, read_detections_from, read_truths,
+    Angles, ImportOptions, Imported, OnError, ReadOptions, Source, import, import_from, read_truths,
 };
 
 use crate::console::Console;
@@ -32,6 +32,9 @@ pub struct ReadArguments {
     /// Name of the sensor, for a detection table that does not name one.
     #[arg(long, value_name = "NAME")]
     pub sensor: Option<String>,
+    /// Keep base stations, aids to navigation and aircraft among the ships (ais, nmea).
+    #[arg(long)]
+    pub all_stations: bool,
 }
 
 /// A unit of angles.
@@ -56,7 +59,12 @@ impl ReadArguments {
             AngleUnit::Degrees => Angles::Degrees,
             AngleUnit::Radians => Angles::Radians,
         };
-        ReadOptions { angles, sensor: self.sensor.as_deref().map(Into::into), columns: self.columns.clone() }
+        ReadOptions {
+            angles,
+            sensor: self.sensor.as_deref().map(Into::into),
+            columns: self.columns.clone(),
+            on_error: OnError::Fail,
+        }
     }
 
     /// The source of a file: the one that was named, or the one that it looks like.
@@ -77,26 +85,11 @@ impl ReadArguments {
         console: &Console,
     ) -> Result<Imported, Failure> {
         let _progress = Progress::spinner(console, "reading");
-        let options = ImportOptions { read: self.options(), ..options };
+        let options = ImportOptions { read: self.options(), all_stations: self.all_stations, ..options };
         match paths {
-            [path] if is_stdin(path.as_ref()) => self.import_stdin(source),
+            [path] if is_stdin(path.as_ref()) => Ok(import_from(source, std::io::stdin(), STDIN, &options)?),
             _ => Ok(import(source, paths, &options)?),
         }
-    }
-
-    fn import_stdin(&self, source: Source) -> Result<Imported, Failure> {
-        let format = match source {
-            Source::Csv => Format::Csv,
-            Source::Parquet => Format::Parquet,
-            Source::Ndjson => Format::Ndjson,
-            other => {
-                let message =
-                    format!("a recording of the kind `{}` cannot come from standard input", other.name());
-                return Err(Failure::usage(message));
-            }
-        };
-        let detections = read_detections_from(std::io::stdin(), format, STDIN, &self.options())?;
-        Ok(Imported { detections, ..Imported::default() })
     }
 }
 

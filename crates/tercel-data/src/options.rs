@@ -20,6 +20,18 @@ pub struct ReadOptions {
     pub sensor: Option<Arc<str>>,
     /// Names of the columns of a CSV file without header, in their order.
     pub columns: Option<Vec<String>>,
+    /// What becomes of a row that cannot be used.
+    pub on_error: OnError,
+}
+
+/// What becomes of a row that cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OnError {
+    /// The file is refused.
+    #[default]
+    Fail,
+    /// The row is left out and counted.
+    Skip,
 }
 
 impl ReadOptions {

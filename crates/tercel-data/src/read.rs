@@ -27,6 +27,20 @@ pub(crate) fn read_as(path: &Path, format: Format, options: &ReadOptions) -> Res
     Ok(Imported { detections, notes: remarks.notes, left_out: remarks.left_out, truths: None })
 }
 
+/// Reads detections from a stream, with what is worth saying of them.
+pub(crate) fn read_stream_as(
+    reader: impl Read,
+    format: Format,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<Imported, DataError> {
+    let file: Arc<str> = name.into();
+    let mut reader = decompressed(reader, &file)?;
+    let mut remarks = Remarks::default();
+    let detections = read_table(reader.as_mut(), format, &file, options, &mut remarks)?;
+    Ok(Imported { detections, notes: remarks.notes, left_out: remarks.left_out, truths: None })
+}
+
 fn from_stream<T: Layout>(
     reader: impl Read,
     format: Format,

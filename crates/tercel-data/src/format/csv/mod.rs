@@ -15,7 +15,6 @@ use crate::metadata::Metadata;
 use crate::options::ReadOptions;
 use crate::remarks::Remarks;
 
-pub(crate) use record::Record;
 pub(crate) use rows::Rows;
 pub(crate) use writer::Writer;
 

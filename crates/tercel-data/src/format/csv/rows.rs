@@ -37,7 +37,7 @@ pub(crate) struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// Looks at the first lines. `columns` are names for a file without header.
     pub fn new(
-        reader: &'a mut dyn std::io::BufRead,
+        reader: impl std::io::BufRead + 'a,
         file: &Arc<str>,
         columns: Option<&[String]>,
     ) -> Result<Self, DataError> {
@@ -167,6 +167,11 @@ impl<'a> Rows<'a> {
             format!("there is no header: the first line has {} values and no names", self.width),
             format!("name the {} columns in their order, such as --columns {guess}", self.width),
         ))
+    }
+
+    /// The record that was read last.
+    pub fn record(&self) -> &Record {
+        &self.record
     }
 
     /// The next record and its line, from 1. After an error of one row the next one can be read.
