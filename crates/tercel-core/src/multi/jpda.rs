@@ -145,7 +145,7 @@ impl<B: Clone> Jpda<B> {
             .extend(scan.measurements.iter().map(|measurement| ln_clutter_at(filter, scan, measurement)));
         let mut compared: Vec<&F::Measurement> = Vec::new();
         for (row, track) in self.objects.tracks.iter().enumerate() {
-            let (seen, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
+            let (seen, near) = vicinity.look(filter, &track.belief, scan);
             detection.push(seen);
             let prior = (track.existence * seen).ln() - (1.0 - track.existence * seen).ln();
             compared.clear();
@@ -242,7 +242,7 @@ impl<B: Clone> Tracker for Jpda<B> {
     {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.objects.predict(filter, dt, self.config.survival);
         self.associate(filter, scan);
         self.update(filter, scan);

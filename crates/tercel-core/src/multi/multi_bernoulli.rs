@@ -196,7 +196,7 @@ impl<B: Clone> MultiBernoulli<B> {
             let mut pairs: Vec<(usize, Term<B, ()>)> = Vec::new();
             let mut detected = 0.0;
             for term in &mut object.beliefs {
-                let (detection, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
+                let (detection, near) = vicinity.look(filter, &term.belief, scan);
                 detected += term.weight * detection;
                 for &number in near {
                     let mut belief = term.belief.clone();
@@ -336,7 +336,7 @@ impl<B: Clone> Tracker for MultiBernoulli<B> {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
         self.roster.begin();
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.predict(filter, dt);
         self.contribute(filter, scan);
         self.collect(filter);

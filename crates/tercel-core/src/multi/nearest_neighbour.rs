@@ -130,7 +130,7 @@ impl<B: Clone> NearestNeighbour<B> {
         misses.clear();
         detection.clear();
         for (row, track) in self.objects.tracks.iter().enumerate() {
-            let (seen, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
+            let (seen, near) = vicinity.look(filter, &track.belief, scan);
             detection.push(seen);
             misses.push(-(1.0 - track.existence * seen).max(f64::MIN_POSITIVE).ln());
             for &column in near {
@@ -200,7 +200,7 @@ impl<B: Clone> Tracker for NearestNeighbour<B> {
     {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.objects.predict(filter, dt, self.config.survival);
         self.assign(filter, scan);
         self.update(filter, scan);

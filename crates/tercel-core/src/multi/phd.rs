@@ -167,7 +167,7 @@ impl<B: Clone> Phd<B> {
         explained.clear();
         explained.resize(scan.measurements.len(), 0.0);
         for term in &mut self.terms {
-            let (detection, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
+            let (detection, near) = vicinity.look(filter, &term.belief, scan);
             term.tag = Label { id: term.tag.id, measurement: None, in_view: detection > 0.0 };
             for &number in near {
                 let mut belief = term.belief.clone();
@@ -243,7 +243,7 @@ impl<B: Clone> Tracker for Phd<B> {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
         self.roster.begin();
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.predict(filter, dt);
         self.update(filter, scan);
         let (merge, cap) = (self.config.merge, self.config.cap);

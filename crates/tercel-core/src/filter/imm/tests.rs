@@ -2,7 +2,7 @@ use super::*;
 use crate::filter::{Extended, Kalman, Padded, Unscented};
 use crate::motion::{ConstantAcceleration, ConstantVelocity, Turn};
 use crate::sensor::{Measurement, Position, RangeBearing};
-use nalgebra::{matrix, vector};
+use nalgebra::{SMatrix, vector};
 use proptest::prelude::*;
 
 type Modes = Imm<Kalman<Turn, Position<2>>>;
@@ -96,9 +96,10 @@ impl Filter<4> for Broken {
     fn merge(&self, belief: &mut Gaussian<4>, weight: f64, other: &Gaussian<4>, other_weight: f64) {
         belief.merge(weight, other, other_weight);
     }
-    fn reach(&self, _: &Gaussian<4>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+    fn reach(&self, _: &Gaussian<4>, _: &Search) -> Option<Region> {
         None
     }
+    fn widen(&self, _: &mut Search, _: &Measurement<2>) {}
     fn place(&self, _: &Measurement<2>) -> Option<Vector2<f64>> {
         None
     }
@@ -214,11 +215,11 @@ fn the_reach_covers_the_places_that_modes_expect() {
     let start = Gaussian { mean: vector![0.0, 0.0, 50.0, 0.0], covariance: SMatrix::identity() };
     imm.set_state(&mut belief, &start);
     imm.predict(&mut belief, 2.0);
-    let (place, spread) = imm.reach(&belief).unwrap();
-    let ahead = 50.0 * 1.0_f64.sin() / 0.5;
-    assert!((place - vector![ahead, 0.0]).norm() < 1e-9);
-    assert!(spread[(1, 1)] > 2000.0 && spread[(0, 0)] < 200.0, "{spread}");
-    assert!(spread.determinant() > 0.0 && spread != matrix![0.0, 0.0; 0.0, 0.0]);
+    let Region { centre, low, high } = imm.reach(&belief, &Search::default()).unwrap();
+    let (ahead, aside) = (50.0 * 1.0_f64.sin() / 0.5, 50.0 * (1.0 - 1.0_f64.cos()) / 0.5);
+    assert!((centre - vector![ahead, 0.0]).norm() < 1e-9);
+    assert!(high.y > aside + 10.0 && low.y < -aside - 10.0 && high.y < 2.0 * aside, "{low} {high}");
+    assert!(low.x > 0.0 && high.x < ahead + 60.0, "{low} {high}");
 }
 
 proptest! {

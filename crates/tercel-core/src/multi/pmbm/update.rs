@@ -115,7 +115,7 @@ impl<B: Clone> Pmbm<B> {
             for tree in 0..group.trees.len() {
                 let shares = group.shares(tree);
                 for (leaf, here) in group.trees[tree].leaves.iter_mut().enumerate() {
-                    let (seen, near) = vicinity.look(filter, &here.belief, scan, &self.config.gate);
+                    let (seen, near) = vicinity.look(filter, &here.belief, scan);
                     here.detection = seen;
                     let ln_prior = (here.existence * seen).ln() - ln_not(here.existence * seen);
                     for &measurement in near {
