@@ -9,7 +9,8 @@
 //! | [`BearingOnly`] | bearing |
 //!
 //! Bearings are mathematical: zero along `x`, counter-clockwise. Every sensor stands somewhere and may be moved between
-//! scans: sensors are small values, so a moved one is simply a new one.
+//! scans: sensors are small values, so a moved one is simply a new one. Polar sensors see the plane: slant ranges of objects at a
+//! height are turned into [ranges over ground](ground_range) before.
 
 mod aged;
 mod bearing_only;
@@ -18,6 +19,7 @@ mod measurement;
 mod position;
 mod range_bearing;
 mod range_bearing_rate;
+mod slant;
 
 use std::f64::consts::{PI, TAU};
 
@@ -34,6 +36,7 @@ pub use measurement::{Measurement, Reading};
 pub use position::Position;
 pub use range_bearing::RangeBearing;
 pub use range_bearing_rate::RangeBearingRate;
+pub use slant::ground_range;
 
 /// A sensor that measures `M` components of a state of `N` components.
 ///
