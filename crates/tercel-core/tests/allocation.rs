@@ -4,6 +4,7 @@
 
 use allocation_counter::measure;
 use nalgebra::{Matrix2, vector};
+use tercel_core::association::Search;
 use tercel_core::belief::Gaussian;
 use tercel_core::extended::{
     Aligned, AlignedAutoRegressive, Centroid, Evolution, InverseWishart, KnownSize, MemEkf, MemRbpf,
@@ -26,7 +27,7 @@ where
         filter.predict(&mut belief, 1.0);
         filter.innovation(&belief, &seen).unwrap();
         filter.update(&mut belief, &seen).unwrap();
-        filter.reach(&belief);
+        filter.reach(&belief, &Search::default());
         filter.state(&belief)
     };
     (0..10).for_each(|_| {
@@ -111,7 +112,7 @@ where
         for scan in &scans {
             filter.predict(&mut belief, 1.0);
             filter.update(&mut belief, scan).unwrap();
-            filter.reach(&belief);
+            filter.reach(&belief, &Search::default());
         }
         filter.state(&belief)
     };

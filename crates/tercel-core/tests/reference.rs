@@ -4,6 +4,7 @@
 
 use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
 use serde_json::Value;
+use tercel_core::association::Region;
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Filter, Imm, Kalman, SigmaPoints, Transition, Unscented};
@@ -60,8 +61,8 @@ impl<S: Sensor<4, 2>> Sensor<4, 2> for Interleaved<S> {
     fn place(&self, seen: &Measurement<2>) -> Option<Vector2<f64>> {
         self.0.place(seen)
     }
-    fn footprint(&self, state: &Vector4<f64>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.0.footprint(&ours(state))
+    fn region(&self, expected: &Vector2<f64>, half: &Vector2<f64>) -> Option<Region> {
+        self.0.region(expected, half)
     }
 }
 

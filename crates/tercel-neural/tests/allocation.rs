@@ -5,6 +5,7 @@
 mod untrained;
 
 use allocation_counter::measure;
+use tercel_core::association::Search;
 use tercel_core::extended::{Points, Scattering};
 use tercel_core::filter::Filter;
 use tercel_core::motion::ConstantVelocity;
@@ -28,7 +29,7 @@ fn allocations<F: Filter<4, Measurement = Measurement<2>>>(filter: &F) -> u64 {
         filter.update(&mut belief, &seen).unwrap();
         copy.clone_from(&belief);
         filter.merge(&mut copy, 0.5, &belief, 0.5);
-        filter.reach(&belief);
+        filter.reach(&belief, &Search::default());
         filter.state(&belief)
     };
     (0..10).for_each(|_| {
@@ -117,7 +118,7 @@ fn allocations_with_points<F: Filter<4, Measurement = Points>>(filter: &F) -> u6
         for scan in &scans {
             filter.predict(&mut belief, 1.0);
             filter.update(&mut belief, scan).unwrap();
-            filter.reach(&belief);
+            filter.reach(&belief, &Search::default());
         }
         filter.state(&belief)
     };

@@ -1,6 +1,7 @@
 //! From the motion and filter sections to a filter, whatever the sensor of the moment.
 
 use nalgebra::{SMatrix, SVector, Vector2};
+use tercel_core::association::Region;
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{
@@ -182,8 +183,12 @@ impl<const K: usize, const N: usize, const M: usize> Sensor<K, M> for Shortened<
         self.sensor.noise(expected)
     }
 
-    fn read(&self, measurement: &Measurement<M>) -> Reading<M> {
-        self.sensor.read(measurement)
+    fn read(
+        &self,
+        measurement: &Measurement<M>,
+        expected: Option<&SVector<f64, M>>,
+    ) -> Result<Reading<M>, FilterError> {
+        self.sensor.read(measurement, expected)
     }
 
     fn periodic(&self) -> [bool; M] {
@@ -204,8 +209,8 @@ impl<const K: usize, const N: usize, const M: usize> Sensor<K, M> for Shortened<
         self.sensor.place(measurement)
     }
 
-    fn footprint(&self, state: &SVector<f64, K>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.sensor.footprint(&lengthened(state))
+    fn region(&self, expected: &SVector<f64, M>, half: &SVector<f64, M>) -> Option<Region> {
+        self.sensor.region(expected, half)
     }
 
     fn axes(&self) -> usize {

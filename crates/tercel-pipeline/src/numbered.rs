@@ -1,6 +1,7 @@
 //! A filter whose measurements are numbers of those of a scan.
 
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::Vector2;
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::extended::InverseWishart;
@@ -76,8 +77,12 @@ impl<B: Clone, const N: usize, const M: usize> Filter<N> for Numbered<'_, B, N, 
         self.filter.estimate(belief)
     }
 
-    fn reach(&self, belief: &B) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.filter.reach(belief)
+    fn reach(&self, belief: &B, search: &Search) -> Option<Region> {
+        self.filter.reach(belief, search)
+    }
+
+    fn widen(&self, search: &mut Search, number: &usize) {
+        self.filter.widen(search, &self.measurements[*number]);
     }
 
     fn place(&self, number: &usize) -> Option<Vector2<f64>> {

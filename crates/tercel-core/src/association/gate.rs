@@ -2,6 +2,8 @@
 
 use nalgebra::{SMatrix, Vector2};
 
+use super::Region;
+
 /// Measurements sorted into the cells of a grid, so that the few near an object are found without looking at all.
 ///
 /// ```
@@ -55,13 +57,16 @@ impl PlaceIndex {
         limit: f64,
         found: &mut Vec<usize>,
     ) {
+        self.within(&Region::ellipse(*centre, covariance, limit), found);
+    }
+
+    /// Writes to `found`, in rising order, the measurements inside a region, and all without a place.
+    pub fn within(&self, region: &Region, found: &mut Vec<usize>) {
         found.clear();
-        let half = Vector2::new((limit * covariance[(0, 0)]).sqrt(), (limit * covariance[(1, 1)]).sqrt());
-        let (low, high) = (self.cell_of(&(centre - half)), self.cell_of(&(centre + half)));
+        let (low, high) = (self.cell_of(&region.low), self.cell_of(&region.high));
         let mut take = |entries: &[([i64; 2], u32)]| {
             for &(_, number) in entries {
-                let offset = self.places[number as usize] - centre;
-                if offset.x.abs() <= half.x && offset.y.abs() <= half.y {
+                if region.contains(&self.places[number as usize]) {
                     found.push(number as usize);
                 }
             }

@@ -4,6 +4,7 @@ use super::clusters::Clusters;
 
 mod enumeration;
 mod propagation;
+mod subsets;
 #[cfg(test)]
 mod tests;
 
@@ -16,14 +17,16 @@ mod tests;
 /// p_ij = Σ_{θ ∋ (i,j)} weight(θ) / Σ_θ weight(θ)
 /// ```
 /// Rows that share no column, not even through others, are told apart. In a cluster with few assignments these are
-/// enumerated, but for columns that only one row wants: these stand in no other's way. In a larger one loopy belief propagation approximates their sum: messages between rows and columns,
+/// enumerated, but for columns that only one row wants: these stand in no other's way. In one with few contested columns all
+/// assignments are summed by the sets of columns that they take. In a larger one loopy belief propagation approximates their sum: messages between rows and columns,
 /// ```text
 /// row to column    m_ij = w_ij / (1 + Σ_{k≠j} w_ik n_ik)
 /// column to row    n_ij = 1 / (1 + Σ_{k≠i} m_kj)
 /// ```
 /// which always converge. Where two rows want the same two columns these messages alone err by up to 0.4. So each row is then
 /// looked at together with those that compete with it most: all assignments of these few are enumerated, and only what the
-/// others claim comes from messages. In a crowd of thousands the messages have to do.
+/// others claim comes from messages. In a crowd of thousands the messages have to do. Where rows looked at one by one claim more
+/// than the whole of a column, their claims are reduced in proportion.
 ///
 /// ## Use it when
 /// an update weighs all associations instead of deciding for one: joint probabilistic data association.
@@ -83,11 +86,15 @@ struct Entry {
 /// Assignments of a cluster up to which they are enumerated.
 const ENUMERABLE: usize = 4096;
 
+/// Steps of a sum over sets of columns that take as long as one assignment of those to be enumerated.
+const STEPS: usize = 16;
+
 /// Logarithms of weights are cut here: beyond, a pair is certain or impossible, and products must stay finite.
 const LARGEST_LN: f64 = 60.0;
 
 impl Default for Marginals {
-    /// Enumerates clusters of up to 4096 assignments.
+    /// Is exact in clusters of up to 4096 assignments, or with up to 65,536 pairs of a row and a set of contested columns: some
+    /// dozen of these.
     fn default() -> Self {
         Marginals::with_exact(ENUMERABLE)
     }
@@ -95,7 +102,8 @@ impl Default for Marginals {
 
 impl Marginals {
     /// Enumerates the clusters that have up to `exact` assignments of the columns that several rows want (counted without their
-    /// conflicts), and approximates the others.
+    /// conflicts), sums by sets of such columns in those where this takes up to 16 times as many steps, and approximates the
+    /// others.
     pub fn with_exact(exact: usize) -> Self {
         Marginals {
             exact,
@@ -150,6 +158,8 @@ impl Marginals {
         let local = &mut self.local;
         if local.events() <= self.exact {
             enumeration::solve(local);
+        } else if subsets::steps(local) <= self.exact.saturating_mul(STEPS) {
+            subsets::solve(local);
         } else {
             propagation::solve(local);
         }

@@ -58,12 +58,6 @@ impl Gate {
     pub fn contains(&self, innovation: &Innovation) -> bool {
         innovation.nis <= self.limit(innovation.dof())
     }
-
-    /// A limit for distances in the plane under which every measurement inside lies. Generous, because an object's expected
-    /// place is only a linear guess for polar sensors, and a loose search costs little.
-    pub(crate) fn search_limit(&self) -> f64 {
-        2.0 * self.limits[2]
-    }
 }
 
 impl Default for Gate {

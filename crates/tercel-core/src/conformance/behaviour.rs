@@ -2,6 +2,7 @@
 
 use super::world::{Held, Seen, apart, bits, is_sound, look, moving, tracked};
 use super::{Problem, Subject};
+use crate::association::{Gate, Search};
 use crate::filter::{Filter, Innovation};
 
 /// A prediction over no time leaves the state as it is.
@@ -125,21 +126,28 @@ pub fn the_same_steps_give_the_same_belief<const N: usize, S: Subject<N>>(subjec
     assert!(bits(&filter, &belief) == bits(&again, &other), "two runs of the same steps differ");
 }
 
-/// Measurements of the object lie within the reach of its belief, which is what gates search, and the reach is no larger
-/// than the measurement noise and the belief explain.
+/// Measurements of the object lie within the reach of its belief, which is what gates search, and so does every one that the
+/// gate takes.
 pub fn the_reach_covers_the_measurements<const N: usize, S: Subject<N>>(subject: &S) {
     let (filter, mut belief, mut world) = tracked(subject, 19, 5);
     let (mut inside, mut count) = (0, 0);
+    let gate = Gate::new(0.99).unwrap();
     for _ in 0..200 {
         world.step(1.0);
         filter.predict(&mut belief, 1.0);
         let seen = look(subject, &mut world);
-        let (Some((centre, spread)), Some(place)) = (filter.reach(&belief), filter.place(&seen)) else {
+        let mut search = Search::new(gate);
+        filter.widen(&mut search, &seen);
+        let (Some(region), Some(place)) = (filter.reach(&belief, &search), filter.place(&seen)) else {
             return;
         };
-        let difference = place - centre;
-        let inverse = spread.try_inverse().expect("the reach has an extent");
-        inside += usize::from((difference.transpose() * inverse * difference)[0] < 9.21);
+        let found = region.contains(&place);
+        let gated = filter.innovation(&belief, &seen).is_ok_and(|innovation| gate.contains(&innovation));
+        assert!(
+            found || !gated,
+            "a measurement inside the gate at {place} is not searched for in {region:?}"
+        );
+        inside += usize::from(found);
         count += 1;
         assert!(filter.area(&seen) > 0.0, "a unit of measurement covers no area");
         filter.update(&mut belief, &seen).unwrap();

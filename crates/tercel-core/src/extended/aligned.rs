@@ -1,12 +1,13 @@
 //! An object of known size that points where it goes.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 
 use super::heading::{fuse, replace_velocity, velocity};
 use super::known_size::{Body, Oriented, axial_mean, course};
 use super::orientation::{ln_constant, ln_scatter};
 use super::random_matrix::centre;
 use super::{Points, Scattering, scan_state};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
@@ -137,8 +138,8 @@ impl<const N: usize, T: Motion<N>> Filter<N> for Aligned<T> {
         Estimate { extent: Some(self.body.extent(belief.angle)), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &Oriented<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        self.body.reach(&belief.state, belief.angle)
+    fn reach(&self, belief: &Oriented<N>, search: &Search) -> Option<Region> {
+        self.body.reach(&belief.state, belief.angle, search)
     }
 
     scan_state!();

@@ -1,10 +1,11 @@
 //! An aligned object whose motion is identified while it is tracked.
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{SMatrix, SVector, Vector2};
 
 use super::aligned::{begin, condition};
 use super::known_size::{Body, Oriented, axial_mean, course};
 use super::{Points, Scattering, scan_state};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::filter::{Estimate, Filter, Innovation};
@@ -197,8 +198,8 @@ impl<const N: usize, const B: usize> Filter<N> for AlignedAutoRegressive<B> {
         Estimate { extent: Some(self.body.extent(belief.angle)), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &Identified<N, B>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        self.body.reach(&belief.state, belief.angle)
+    fn reach(&self, belief: &Identified<N, B>, search: &Search) -> Option<Region> {
+        self.body.reach(&belief.state, belief.angle, search)
     }
 
     scan_state!();

@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::random_matrix::{centre, position_covariance};
 use super::{Points, Scattering, scan_state};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
@@ -123,10 +124,10 @@ impl<const N: usize, T: Motion<N>> Filter<N> for Centroid<T> {
         Estimate { extent: Some(belief.extent), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &Seen<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn reach(&self, belief: &Seen<N>, search: &Search) -> Option<Region> {
         let spread = self.scattering.spread(&belief.extent);
         let place = Vector2::new(belief.state.mean[0], belief.state.mean[1]);
-        Some((place, position_covariance(&belief.state) + spread))
+        Some(search.around(place, &(position_covariance(&belief.state) + spread)))
     }
 
     scan_state!();

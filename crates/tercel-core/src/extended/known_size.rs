@@ -5,6 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::orientation::{AngleLikelihood, ln_scatter};
 use super::random_matrix::{centre, position_covariance};
 use super::{Points, Scattering, scan_state, symmetric::composed};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
@@ -95,13 +96,9 @@ impl Body {
     }
 
     /// Where points of an object at this state and angle may lie.
-    pub fn reach<const N: usize>(
-        &self,
-        state: &Gaussian<N>,
-        angle: f64,
-    ) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    pub fn reach<const N: usize>(&self, state: &Gaussian<N>, angle: f64, search: &Search) -> Option<Region> {
         let place = Vector2::new(state.mean[0], state.mean[1]);
-        Some((place, position_covariance(state) + self.spread(angle)))
+        Some(search.around(place, &(position_covariance(state) + self.spread(angle))))
     }
 }
 
@@ -189,8 +186,8 @@ impl<const N: usize, T: Motion<N>> Filter<N> for KnownSize<T> {
         Estimate { extent: Some(self.body.extent(belief.angle)), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &Oriented<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        self.body.reach(&belief.state, belief.angle)
+    fn reach(&self, belief: &Oriented<N>, search: &Search) -> Option<Region> {
+        self.body.reach(&belief.state, belief.angle, search)
     }
 
     scan_state!();

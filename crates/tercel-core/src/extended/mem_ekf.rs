@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Matrix3, RowVector3, SMatrix, Vector2, Vector3};
 
 use super::random_matrix::{centre, position_covariance};
 use super::{Ellipse, Points, Scattering, congruent, rotation, scan_state};
+use crate::association::{Region, Search};
 use crate::belief::{Cholesky, Gaussian};
 use crate::error::FilterError;
 use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
@@ -225,10 +226,11 @@ impl<const N: usize, T: Motion<N>> Filter<N> for MemEkf<T> {
         Estimate { extent: Some(self.axes(&belief.shape)), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &Shaped<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn reach(&self, belief: &Shaped<N>, search: &Search) -> Option<Region> {
         let state = &belief.state;
         let spread = self.scattering.spread(&self.axes(&belief.shape));
-        Some((Vector2::new(state.mean[0], state.mean[1]), position_covariance(state) + spread))
+        let place = Vector2::new(state.mean[0], state.mean[1]);
+        Some(search.around(place, &(position_covariance(state) + spread)))
     }
 
     scan_state!();

@@ -10,6 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::orientation::ln_scatter;
 use super::random_matrix::{centre, position_covariance};
 use super::{Points, Scattering, congruent, rotation, scan_state};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted, resample, seed_of};
@@ -363,10 +364,11 @@ impl<const N: usize, T: Motion<N>> Filter<N> for MemRbpf<T> {
         Estimate { extent: Some(belief.extent()), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &ShapeParticles<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn reach(&self, belief: &ShapeParticles<N>, search: &Search) -> Option<Region> {
         let state = &belief.state;
         let spread = self.scattering.spread(&belief.extent());
-        Some((Vector2::new(state.mean[0], state.mean[1]), position_covariance(state) + spread))
+        let place = Vector2::new(state.mean[0], state.mean[1]);
+        Some(search.around(place, &(position_covariance(state) + spread)))
     }
 
     scan_state!();

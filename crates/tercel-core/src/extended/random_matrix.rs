@@ -7,6 +7,7 @@ use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::symmetric::{congruent, inverse_root, root, rotation};
 use super::{Freedom, InverseWishart, Points, Rate, Scattering, scan_state};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::filter::{Comparison, Estimate, Filter, Innovation, predicted};
@@ -387,10 +388,11 @@ impl<const N: usize, T: Motion<N>> Filter<N> for RandomMatrix<T> {
         belief.extent = *extent;
     }
 
-    fn reach(&self, belief: &GaussianInverseWishart<N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn reach(&self, belief: &GaussianInverseWishart<N>, search: &Search) -> Option<Region> {
         let state = &belief.state;
         let spread = self.spread(&belief.extent.mean());
-        Some((Vector2::new(state.mean[0], state.mean[1]), position_covariance(state) + spread))
+        let place = Vector2::new(state.mean[0], state.mean[1]);
+        Some(search.around(place, &(position_covariance(state) + spread)))
     }
 
     scan_state!();

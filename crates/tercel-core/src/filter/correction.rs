@@ -30,28 +30,16 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         belief: &Gaussian<N>,
         measurement: &Measurement<M>,
     ) -> Result<Self, FilterError> {
-        Comparison::of_reading(sensor, belief, &sensor.read(measurement), measurement.age)
-    }
-
-    /// Compares a reading of this age that was taken before, when many beliefs are compared with one measurement.
-    #[inline(always)]
-    pub fn of_reading(
-        sensor: &impl Sensor<N, M>,
-        belief: &Gaussian<N>,
-        reading: &Reading<M>,
-        age: f64,
-    ) -> Result<Self, FilterError> {
-        let sensor = Aged::new(sensor, age);
-        let residual = sensor.difference(&reading.value, &sensor.expected(&belief.mean));
-        if !residual.iter().all(|x| x.is_finite()) {
-            return Err(FilterError::NotFinite { what: "innovation" });
-        }
+        let sensor = Aged::new(sensor, measurement.age);
+        let expected = sensor.expected(&belief.mean);
+        let Reading { value, noise } = sensor.read(measurement, Some(&expected))?;
+        let residual = sensor.difference(&value, &expected);
         let jacobian = sensor.jacobian(&belief.mean);
         let cross = sensor.project(&belief.covariance, &jacobian);
-        let factor = Cholesky::new(&(jacobian * cross + reading.noise), "innovation covariance")?;
-        let nis = factor.mahalanobis(&residual);
+        let factor = Cholesky::new(&(jacobian * cross + noise), "innovation covariance")?;
+        let nis = near(factor.mahalanobis(&residual))?;
         let innovation = Innovation::new(&residual, nis, factor.ln_density(nis));
-        Ok(Comparison { age, residual, noise: reading.noise, jacobian, cross, factor, innovation })
+        Ok(Comparison { age: measurement.age, residual, noise, jacobian, cross, factor, innovation })
     }
 
     /// Conditions the belief on the measurement, with the covariance in Joseph's form. On an error it stays as it was.
@@ -103,6 +91,19 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
     }
 }
 
+/// Largest normalised innovation squared. The square of what lies farther away than this may be too large for a double in the
+/// next step, when modes are mixed.
+const LARGEST_NIS: f64 = 1e200;
+
+/// A normalised innovation squared that can be computed with.
+///
+/// # Errors
+/// When it is not finite or too large: something is not a number, or the measurement lies beyond all bounds.
+#[inline(always)]
+pub(super) fn near(nis: f64) -> Result<f64, FilterError> {
+    if nis <= LARGEST_NIS { Ok(nis) } else { Err(FilterError::NotFinite { what: "innovation" }) }
+}
+
 /// Compares a belief with several measurements. What the expected reading shares with those of one age is computed once, and the
 /// factor of the innovation covariance once for readings of the same noise.
 pub(crate) fn compare_all<const N: usize, const M: usize>(
@@ -130,11 +131,8 @@ fn compare_run<const N: usize, const M: usize>(
     let spread = jacobian * sensor.project(&belief.covariance, &jacobian);
     let mut last: Option<(SMatrix<f64, M, M>, Cholesky<M>, f64)> = None;
     found.extend(measurements.iter().map(|measurement| {
-        let reading = sensor.read(measurement);
+        let reading = sensor.read(measurement, Some(&expected))?;
         let residual = sensor.difference(&reading.value, &expected);
-        if !residual.iter().all(|x| x.is_finite()) {
-            return Err(FilterError::NotFinite { what: "innovation" });
-        }
         let (_, factor, ln_peak) = match &last {
             Some(shared) if shared.0 == reading.noise => shared,
             _ => {
@@ -142,7 +140,7 @@ fn compare_run<const N: usize, const M: usize>(
                 last.insert((reading.noise, factor, factor.ln_density(0.0)))
             }
         };
-        let nis = factor.mahalanobis(&residual);
+        let nis = near(factor.mahalanobis(&residual))?;
         Ok(Innovation::new(&residual, nis, ln_peak - 0.5 * nis))
     }));
 }
@@ -157,16 +155,15 @@ pub(crate) fn associate<const N: usize, const M: usize>(
     none: f64,
 ) -> Option<f64> {
     let first = parts.first()?.1;
-    let common = sensor.read(first);
-    let comparison = Comparison::of_reading(sensor, belief, &common, first.age).ok()?;
+    let comparison = Comparison::new(sensor, belief, first).ok()?;
     let expected = Aged::new(sensor, first.age).expected(&belief.mean);
     // Mean and covariance of the residual; it is zero where no measurement is the object's own.
     let (mut mean, mut scatter) = (SVector::<f64, M>::zeros(), SMatrix::<f64, M, M>::zeros());
     let (mut total, mut weight) = (none, 0.0);
     for (part, measurement) in parts.iter().filter(|part| part.0 > 0.0) {
-        let reading = sensor.read(measurement);
+        let reading = sensor.read(measurement, Some(&expected)).ok()?;
         let difference = sensor.difference(&reading.value, &expected) - mean;
-        let alike = reading.noise == common.noise && measurement.age == first.age;
+        let alike = reading.noise == comparison.noise && measurement.age == first.age;
         if !alike || !difference.iter().all(|x| x.is_finite()) {
             return None;
         }

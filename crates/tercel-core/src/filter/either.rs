@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, Vector2};
 
 use super::{Estimate, Filter, Innovation};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::extended::InverseWishart;
@@ -148,11 +149,18 @@ where
         }
     }
 
-    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
+    fn reach(&self, belief: &Self::Belief, search: &Search) -> Option<Region> {
         match (self, belief) {
-            (Left(filter), Left(belief)) => filter.reach(belief),
-            (Right(filter), Right(belief)) => filter.reach(belief),
+            (Left(filter), Left(belief)) => filter.reach(belief, search),
+            (Right(filter), Right(belief)) => filter.reach(belief, search),
             _ => None,
+        }
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &A::Measurement) {
+        match self {
+            Left(filter) => filter.widen(search, measurement),
+            Right(filter) => filter.widen(search, measurement),
         }
     }
 
@@ -219,7 +227,7 @@ mod tests {
         let right: Both = Right(Extended::new(Turn::new(0.0, 0.2), radar));
         let mut belief = Filter::<4>::birth(&left, &seen(0)).unwrap();
         assert!(Filter::<4>::update(&right, &mut belief, &seen(1)).is_err());
-        assert!(Filter::<4>::reach(&right, &belief).is_none());
+        assert!(Filter::<4>::reach(&right, &belief, &Search::default()).is_none());
         assert!(!Filter::<4>::state(&right, &belief).mean[0].is_finite());
     }
 }

@@ -3,10 +3,12 @@
 use std::borrow::Borrow;
 use std::ops::AddAssign;
 
-use nalgebra::{SMatrix, SVector, Vector2};
+use nalgebra::{SMatrix, SVector};
 
+use crate::association::{Region, Search};
 use crate::belief::{Gaussian, positive};
-use crate::sensor::Sensor;
+use crate::error::FilterError;
+use crate::sensor::{Aged, Measurement, Sensor};
 
 /// The methods of [`Filter`](super::Filter) that follow from a Gaussian belief and a field `sensor` of `$m` components.
 macro_rules! gaussian_belief {
@@ -27,15 +29,12 @@ macro_rules! gaussian_belief {
             belief.mahalanobis_within(&other.mean, limit)
         }
 
-        fn reach(
-            &self,
-            belief: &Gaussian<N>,
-        ) -> Option<(nalgebra::Vector2<f64>, nalgebra::SMatrix<f64, 2, 2>)> {
-            crate::filter::gaussian::reach(&self.sensor, belief)
-        }
-
         fn place(&self, measurement: &Measurement<$m>) -> Option<nalgebra::Vector2<f64>> {
             self.sensor.place(measurement)
+        }
+
+        fn widen(&self, search: &mut crate::association::Search, measurement: &Measurement<$m>) {
+            search.widen(measurement);
         }
 
         fn area(&self, measurement: &Measurement<$m>) -> f64 {
@@ -45,17 +44,48 @@ macro_rules! gaussian_belief {
 }
 pub(super) use gaussian_belief;
 
-/// Expected place of a measurement of a Gaussian belief, and the covariance of the difference.
-pub(super) fn reach<const N: usize, const M: usize>(
+/// The region in which a gate may take measurements: `innovation` gives the expected reading of a belief, and the variances of a
+/// measurement's difference from it. Every component of a reading inside the gate differs by at most the root of the gate's
+/// limit times its variance.
+#[inline]
+pub(super) fn searched<const N: usize, const M: usize, S: Sensor<N, M>>(
+    sensor: &S,
+    search: &Search,
+    innovation: impl Fn(&Aged<'_, S>, &Measurement<M>) -> Result<(SVector<f64, M>, SVector<f64, M>), FilterError>,
+) -> Option<Region> {
+    // More than rounding of the gate's own comparison, where the innovation covariance is ill-conditioned.
+    let limit = 1.001 * search.limit(M);
+    let mut found: Option<(Region, Region)> = None;
+    for age in search.ages() {
+        let sensor = Aged::new(sensor, age);
+        let mut here: Option<Region> = None;
+        for probe in search.noises() {
+            let Ok((expected, variances)) = innovation(&sensor, &probe) else { continue };
+            let half = variances.map(|variance| (limit * variance).sqrt());
+            let region = sensor.region(&expected, &half)?;
+            here = Some(here.map_or(region, |here| here.and(&region)));
+        }
+        let Some(here) = here else { continue };
+        // Between two ages the region may bulge on its way from one to the other.
+        let all = found.map_or(here, |(all, last)| all.and(&here.stretched_from(&last)));
+        found = Some((all, here));
+    }
+    found.map(|(all, _)| all)
+}
+
+/// The reach of a Gaussian belief whose readings are compared to first order.
+#[inline]
+pub(super) fn linear_reach<const N: usize, const M: usize>(
     sensor: &impl Sensor<N, M>,
     belief: &Gaussian<N>,
-) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-    if N < 2 {
-        return None;
-    }
-    let (place, noise) = sensor.footprint(&belief.mean)?;
-    let position: SMatrix<f64, 2, 2> = SMatrix::from_fn(|i, j| belief.covariance[(i, j)]);
-    Some((place, position + noise))
+    search: &Search,
+) -> Option<Region> {
+    searched(sensor, search, |sensor, probe| {
+        let expected = sensor.expected(&belief.mean);
+        let jacobian = sensor.jacobian(&belief.mean);
+        let spread = jacobian * sensor.project(&belief.covariance, &jacobian);
+        Ok((expected, (spread + sensor.read(probe, Some(&expected))?.noise).diagonal()))
+    })
 }
 
 /// The Gaussian with the moments of a mixture, relative to the sum of its weights. An empty one has no moments: zeros.

@@ -1,8 +1,9 @@
 //! A filter whose measurements may say which object they are of.
 
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::Vector2;
 
 use super::{Estimate, Filter, Innovation};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::extended::InverseWishart;
@@ -123,6 +124,11 @@ impl<B> NamedBelief<B> {
         self.identity.map(|identity| (identity, f64::from(self.sure)))
     }
 
+    /// How far the object may have come since it was seen last, one standard deviation per axis, m.
+    fn moved(&self) -> f64 {
+        f64::from(self.pace) * f64::from(self.since)
+    }
+
     fn shares(&self, identity: Option<Identity>) -> bool {
         identity.is_some() && self.identity == identity && self.sure > LIKELY
     }
@@ -203,11 +209,15 @@ impl<F> Identified<F> {
     where
         F: Filter<N>,
     {
-        let place = self.filter.place(&measurement.measurement)?;
-        let (centre, spread) = self.filter.reach(&belief.belief)?;
-        let moved = f64::from(belief.pace) * f64::from(belief.since);
-        let variance = moved * moved + 0.5 * spread.trace();
-        let square = (place - centre).norm_squared() / variance;
+        if N < 2 {
+            return None;
+        }
+        let before = self.filter.state(&belief.belief);
+        let after = self.filter.state(&self.filter.birth(&measurement.measurement).ok()?);
+        let axes = 0..2;
+        let spread: f64 = axes.clone().map(|i| before.covariance[(i, i)] + after.covariance[(i, i)]).sum();
+        let variance = belief.moved().powi(2) + 0.5 * spread;
+        let square = axes.map(|i| (after.mean[i] - before.mean[i]).powi(2)).sum::<f64>() / variance;
         if innovation.dof() != 2 || !(square <= 2.0 * REACH * REACH) {
             return None;
         }
@@ -343,14 +353,18 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Identified<F> {
         self.filter.estimate(&belief.belief)
     }
 
-    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        let (centre, spread) = self.filter.reach(&belief.belief)?;
+    fn reach(&self, belief: &Self::Belief, search: &Search) -> Option<Region> {
+        let Region { centre, low, high } = self.filter.reach(&belief.belief, search)?;
         if belief.sure <= LIKELY {
-            return Some((centre, spread));
+            return Some(Region { centre, low, high });
         }
         // A measurement of the same name may lie as far away as the name carries, or as the object could have come.
-        let moved = f64::from(belief.pace) * f64::from(belief.since);
-        Some((centre, spread * WIDER + SMatrix::identity() * (moved * moved)))
+        let room = Vector2::repeat(2.0 * REACH * belief.moved());
+        Some(Region { centre, low: low + (low - centre) - room, high: high + (high - centre) + room })
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Self::Measurement) {
+        self.filter.widen(search, &measurement.measurement);
     }
 
     fn place(&self, measurement: &Self::Measurement) -> Option<Vector2<f64>> {
@@ -382,9 +396,6 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Identified<F> {
         belief.identity.filter(|_| belief.sure > LIKELY)
     }
 }
-
-/// How much wider the search for a measurement of the same name is: the gate, and twice the logarithm of the factor.
-const WIDER: f64 = 4.0;
 
 #[cfg(test)]
 mod tests;

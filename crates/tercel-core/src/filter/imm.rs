@@ -2,12 +2,13 @@
 
 mod mixing;
 
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::Vector2;
 
 use super::gaussian::{moments, settle};
 use super::innovation::Blend;
 use super::transition::Chain;
 use super::{Estimate, Filter, Innovation, Transition};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::extended::InverseWishart;
@@ -366,20 +367,18 @@ impl<const N: usize, F: Filter<N>> Filter<N> for Imm<F> {
         }
     }
 
-    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        let mut merged: Option<Gaussian<2>> = None;
-        let mut weight = 0.0;
-        for ((mode, filter), probability) in belief.modes.iter().zip(&self.filters).zip(&belief.probabilities)
-        {
-            let (mean, covariance) = filter.reach(&mode.belief)?;
-            let part = Gaussian { mean, covariance };
-            match &mut merged {
-                Some(merged) => merged.merge(weight, &part, *probability),
-                None => merged = Some(part),
-            }
-            weight += probability;
-        }
-        merged.map(|merged| (merged.mean, merged.covariance))
+    /// That of all modes: the normalised square of the mixture is at least the least of theirs.
+    fn reach(&self, belief: &Self::Belief, search: &Search) -> Option<Region> {
+        let modes = belief.modes.iter().zip(&self.filters).zip(&belief.probabilities);
+        Region::mixture(
+            modes.map(|((mode, filter), probability)| {
+                Some((*probability, filter.reach(&mode.belief, search)?))
+            }),
+        )
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &F::Measurement) {
+        self.filters.iter().for_each(|filter| filter.widen(search, measurement));
     }
 
     fn place(&self, measurement: &F::Measurement) -> Option<Vector2<f64>> {

@@ -1,8 +1,9 @@
 //! The Kalman filter.
 
 use super::correction::{self, Comparison, predicted};
-use super::gaussian::gaussian_belief;
+use super::gaussian::{gaussian_belief, linear_reach};
 use super::{Filter, Innovation, one_by_one};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::motion::LinearMotion;
@@ -102,6 +103,10 @@ where
     fn associate(&self, belief: &mut Gaussian<N>, parts: &[(f64, &Measurement<M>)], none: f64) -> f64 {
         correction::associate(&self.sensor, belief, parts, none)
             .unwrap_or_else(|| one_by_one(self, belief, parts, none))
+    }
+
+    fn reach(&self, belief: &Gaussian<N>, search: &Search) -> Option<Region> {
+        linear_reach(&self.sensor, belief, search)
     }
 
     gaussian_belief!(M);

@@ -30,8 +30,9 @@ mod transition;
 mod turn_bank;
 mod unscented;
 
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::Vector2;
 
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::extended::InverseWishart;
@@ -165,9 +166,13 @@ pub trait Filter<const N: usize> {
         self.state(belief).into()
     }
 
-    /// The part of the plane in which measurements of this object may lie: their expected place, and the covariance of the
-    /// difference. `None` when measurements have no place, and every one must be compared.
-    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)>;
+    /// The part of the plane in which measurements of this object may lie that the gate of `search` takes. No such measurement
+    /// lies outside, as long as the search was [widened](Filter::widen) for it. `None` when measurements have no place, and
+    /// every one must be compared.
+    fn reach(&self, belief: &Self::Belief, search: &Search) -> Option<Region>;
+
+    /// Makes a search allow for what is special about this measurement.
+    fn widen(&self, search: &mut Search, measurement: &Self::Measurement);
 
     /// Where in the plane a measurement lies, if it says so.
     fn place(&self, measurement: &Self::Measurement) -> Option<Vector2<f64>>;
@@ -287,8 +292,11 @@ impl<const N: usize, F: Filter<N> + ?Sized> Filter<N> for Box<F> {
     fn estimate(&self, belief: &Self::Belief) -> Estimate<N> {
         (**self).estimate(belief)
     }
-    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        (**self).reach(belief)
+    fn reach(&self, belief: &Self::Belief, search: &Search) -> Option<Region> {
+        (**self).reach(belief, search)
+    }
+    fn widen(&self, search: &mut Search, measurement: &Self::Measurement) {
+        (**self).widen(search, measurement);
     }
     fn place(&self, measurement: &Self::Measurement) -> Option<Vector2<f64>> {
         (**self).place(measurement)

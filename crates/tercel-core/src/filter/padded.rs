@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector, Vector2};
 
 use super::{Filter, Innovation};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
@@ -126,8 +127,12 @@ where
         self.filter.distance(&belief.leading(), &other.leading(), limit)
     }
 
-    fn reach(&self, belief: &Gaussian<N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.filter.reach(&belief.leading())
+    fn reach(&self, belief: &Gaussian<N>, search: &Search) -> Option<Region> {
+        self.filter.reach(&belief.leading(), search)
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &F::Measurement) {
+        self.filter.widen(search, measurement);
     }
 
     fn place(&self, measurement: &F::Measurement) -> Option<Vector2<f64>> {

@@ -1,16 +1,21 @@
 //! The bootstrap particle filter.
 
-use nalgebra::{SMatrix, SVector, Vector2};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+mod belief;
 
-use super::correction::Comparison;
+use nalgebra::{SMatrix, SVector, Vector2};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::correction::{Comparison, near};
+use super::gaussian::{linear_reach, searched};
 use super::{Filter, Innovation, sampling};
-use crate::belief::{Cholesky, Gaussian, positive};
+use crate::association::{Region, Search};
+use crate::belief::{Cholesky, Gaussian};
 use crate::error::FilterError;
 use crate::motion::Sampled;
 use crate::sensor::{Aged, Measurement, Reading, Sensor};
+pub use belief::Particles;
+use belief::{Room, normal};
 
 /// Estimates the state of an object by many weighted guesses, for motion and sensors of any shape.
 ///
@@ -31,11 +36,11 @@ use crate::sensor::{Aged, Measurement, Reading, Sensor};
 /// ## Use it when
 /// beliefs are far from Gaussian: bearings only, several modes, sharp limits. It needs some thousand particles for a state of
 /// four components and many more for six; with process noise that is small against the belief few particles survive the
-/// first updates, and the covariance comes out too small: see [`with_smoothing`](Particle::with_smoothing).
+/// first updates, which is why those that do are spread: see [`with_smoothing`](Particle::with_smoothing).
 ///
 /// ## Reference
 /// Gordon, Salmond and Smith (1993), algorithm of section 3; systematic resampling of Kitagawa (1996), appendix.
-/// Deviations: weights in the log domain; resampling only below a number of effective particles (Liu and Chen (1998)); smoothing, when asked for, as Liu and West
+/// Deviations: weights in the log domain; resampling only below a number of effective particles (Liu and Chen (1998)); smoothing, unless it is turned off, as Liu and West
 /// (2001), section 10.3; the Gaussian beginning, when asked for ([`with_tentative`](Particle::with_tentative)), is a step of Kotecha
 /// and Djurić (2003).
 ///
@@ -63,179 +68,8 @@ pub struct Particle<T, S, const M: usize = 2> {
     tentative: usize,
 }
 
-/// What a [`Particle`] filter knows of one object: weighted states, and the generator that moves them on.
-#[derive(Debug, PartialEq)]
-pub struct Particles<const N: usize, U = ()> {
-    states: Vec<SVector<f64, N>>,
-    /// What the motion carries with each.
-    memories: Vec<U>,
-    /// Logarithms of the weights, which add up to one.
-    weights: Vec<f64>,
-    random: ChaCha8Rng,
-    room: Room<N, U>,
-}
-
-/// Room for the next states and weights: a step does not allocate.
-#[derive(Debug, PartialEq)]
-struct Room<const N: usize, U> {
-    states: Vec<SVector<f64, N>>,
-    memories: Vec<U>,
-    weights: Vec<f64>,
-    /// Numbers of particles, and those that are drawn.
-    numbers: Vec<usize>,
-    chosen: Vec<usize>,
-}
-
-impl<const N: usize, U> Room<N, U> {
-    fn new(count: usize) -> Self {
-        Room {
-            states: Vec::with_capacity(count),
-            memories: Vec::with_capacity(count),
-            weights: Vec::with_capacity(count),
-            numbers: Vec::with_capacity(count),
-            chosen: Vec::with_capacity(count),
-        }
-    }
-}
-
-impl<const N: usize, U: Clone> Clone for Particles<N, U> {
-    fn clone(&self) -> Self {
-        let room = Room::new(0);
-        Particles {
-            states: self.states.clone(),
-            memories: self.memories.clone(),
-            weights: self.weights.clone(),
-            random: self.random.clone(),
-            room,
-        }
-    }
-
-    // Trackers copy beliefs into buffers of the last scan; their room is used again.
-    fn clone_from(&mut self, source: &Self) {
-        self.states.clone_from(&source.states);
-        self.memories.clone_from(&source.memories);
-        self.weights.clone_from(&source.weights);
-        self.random.clone_from(&source.random);
-    }
-}
-
-impl<const N: usize, U: Clone> Particles<N, U> {
-    /// What the motion carries with each particle.
-    pub fn memories(&self) -> &[U] {
-        &self.memories
-    }
-
-    /// The particles.
-    pub fn states(&self) -> &[SVector<f64, N>] {
-        &self.states
-    }
-
-    /// Natural logarithms of the weights, in the order of the particles; the weights add up to one.
-    pub fn ln_weights(&self) -> &[f64] {
-        &self.weights
-    }
-
-    /// Number of equally weighted particles that would say as much: `1 / Σ wᵢ²`.
-    pub fn effective(&self) -> f64 {
-        sampling::effective(&self.weights)
-    }
-
-    fn weighted(&self) -> impl Iterator<Item = (f64, &SVector<f64, N>)> {
-        self.weights.iter().map(|weight| weight.exp()).zip(&self.states)
-    }
-
-    /// Mean and covariance. Rounding that makes a covariance indefinite is repaired.
-    fn moments(&self) -> Gaussian<N> {
-        let mut mean = SVector::zeros();
-        for (weight, state) in self.weighted() {
-            mean += state * weight;
-        }
-        let mut covariance = SMatrix::zeros();
-        for (weight, state) in self.weighted() {
-            let difference = state - mean;
-            covariance += difference * difference.transpose() * weight;
-        }
-        // A cloud that has shrunk to a point has no covariance to repair, and keeps its zeros.
-        let _ = positive::settle(&mut covariance, "covariance of particles");
-        Gaussian { mean, covariance }
-    }
-
-    /// Draws `count` particles with a chance equal to their weight, each about as often as it should be, from these particles
-    /// and those of `other`, whose weights count `other_share` against the rest.
-    fn resample(&mut self, count: usize, other: Option<(&Particles<N, U>, f64)>) {
-        let share = 1.0 - other.map_or(0.0, |(_, share)| share);
-        let own = self.states.len();
-        let all = own + other.map_or(0, |(particles, _)| particles.states.len());
-        let Room { states, memories, numbers, chosen, .. } = &mut self.room;
-        // Numbers from `own` on are those of the other particles.
-        numbers.clear();
-        numbers.extend(0..all);
-        let weights = self.weights.iter().map(|weight| share * weight.exp());
-        let others = other
-            .into_iter()
-            .flat_map(|(particles, share)| particles.weights.iter().map(move |weight| share * weight.exp()));
-        let offset = self.random.random();
-        sampling::resample(weights.chain(others).zip(&*numbers), offset, count, chosen);
-        states.clear();
-        memories.clear();
-        for &number in &*chosen {
-            let (source, place) = match other {
-                Some((particles, _)) if number >= own => {
-                    ((&particles.states, &particles.memories), number - own)
-                }
-                _ => ((&self.states, &self.memories), number),
-            };
-            states.push(source.0[place]);
-            memories.push(source.1[place].clone());
-        }
-        std::mem::swap(&mut self.states, states);
-        std::mem::swap(&mut self.memories, memories);
-        self.weights.clear();
-        self.weights.resize(count, -(count as f64).ln());
-    }
-
-    /// Spreads the particles by a share of the width of the cloud, without changing its mean and covariance.
-    fn smooth(&mut self, share: f64) {
-        let Gaussian { mean, covariance } = self.moments();
-        let (keep, root) = ((1.0 - share * share).sqrt(), positive::root(&covariance) * share);
-        for state in &mut self.states {
-            *state = mean + (*state - mean) * keep + root * normal(&mut self.random);
-        }
-    }
-
-    /// Moves and stretches the cloud to this mean and covariance. One that has no extent to stretch is drawn anew.
-    fn reshape(&mut self, target: &Gaussian<N>) {
-        let current = self.moments();
-        if let Some(from) = extent(&current) {
-            let to = positive::root(&target.covariance);
-            for state in &mut self.states {
-                *state = target.mean + to * from.whiten(&(*state - current.mean));
-            }
-            return;
-        }
-        self.draw(target);
-    }
-
-    /// Draws all particles anew.
-    fn draw(&mut self, target: &Gaussian<N>) {
-        let root = positive::root(&target.covariance);
-        for state in &mut self.states {
-            *state = target.mean + root * normal(&mut self.random);
-        }
-        let even = -(self.states.len() as f64).ln();
-        self.weights.fill(even);
-    }
-}
-
-/// A factor of the covariance of a cloud, if it extends in every direction by more than rounding explains.
-fn extent<const N: usize>(cloud: &Gaussian<N>) -> Option<Cholesky<N>> {
-    let factor = Cholesky::new(&cloud.covariance, "covariance of particles").ok()?;
-    let real = |i: usize| {
-        let (width, variance) = (factor.lower()[(i, i)], cloud.covariance[(i, i)]);
-        width * width > 1e-12 * variance && width > 1e-12 * cloud.mean[i].abs()
-    };
-    (0..N).all(real).then_some(factor)
-}
+/// Share by which resampled particles are spread when nothing is said.
+const SMOOTHING: f64 = 0.35;
 
 /// Fewest particles of a filter.
 const FEWEST: usize = 10;
@@ -250,7 +84,7 @@ impl<T, S, const M: usize> Particle<T, S, M> {
             let (parameter, expected) = ("number of particles", "must be at least 10");
             return Err(FilterError::Parameter { parameter, value: count as f64, expected });
         }
-        Ok(Particle { motion, sensor, count, seed, threshold: 0.5, smoothing: 0.0, tentative: count })
+        Ok(Particle { motion, sensor, count, seed, threshold: 0.5, smoothing: SMOOTHING, tentative: count })
     }
 
     /// Sets the share of effective particles below which they are resampled; 0 never does, 1 always. The default is 0.5.
@@ -262,10 +96,11 @@ impl<T, S, const M: usize> Particle<T, S, M> {
     }
 
     /// Spreads the copies that resampling makes: each moves by a normal error of this share of the cloud's width, and the cloud
-    /// shrinks by as much, so that its mean and covariance stay. The default is 0, the plain filter.
+    /// shrinks by as much, so that its mean and covariance stay. The default is 0.35; 0 is the plain filter.
     ///
     /// Particles then cannot run out when the process noise is small, at the price of blurring what the cloud's shape has finer
-    /// than this share; 0.2 to 0.35 suits most problems. On a vague birth followed by accurate positions, 6,000 particles with 0.35
+    /// than this share; 0.2 to 0.35 suits most problems. The plain filter collapses there without a word: after some updates all
+    /// particles are copies of one, with a covariance of zero. On a vague birth followed by accurate positions, 6,000 particles with 0.35
     /// are consistent (NEES inside its 99 % bounds) where 12,000 plain ones are too sure by half.
     ///
     /// # Errors
@@ -311,14 +146,15 @@ impl<T, S, const M: usize> Particle<T, S, M> {
         S: Sensor<N, M>,
     {
         let sensor = Aged::new(&self.sensor, measurement.age);
-        let Reading { value, noise } = sensor.read(measurement);
-        let factor = Cholesky::new(&noise, "noise of the measurement")?;
-        let residual_of = |state| sensor.difference(&value, &sensor.expected(state));
         let (mut mean, mut square) = (SVector::<f64, M>::zeros(), SMatrix::<f64, M, M>::zeros());
         let (mut top, mut sum) = (f64::NEG_INFINITY, 0.0);
         let mut origin = None;
+        let mut noises = Noises::default();
         for ((weight, state), ln_weight) in belief.weighted().zip(&belief.weights) {
-            let residual = residual_of(state);
+            let expected = sensor.expected(state);
+            let Reading { value, noise } = sensor.read(measurement, Some(&expected))?;
+            let factor = noises.add(weight, &noise)?;
+            let residual = sensor.difference(&value, &expected);
             let ln = ln_weight + factor.ln_density(factor.mahalanobis(&residual));
             if ln.is_nan() || ln == f64::INFINITY {
                 return Err(FilterError::NotFinite { what: "innovation" });
@@ -338,10 +174,48 @@ impl<T, S, const M: usize> Particle<T, S, M> {
         if top == f64::NEG_INFINITY {
             return Err(FilterError::NotFinite { what: "likelihood of every particle" });
         }
-        let covariance = square - mean * mean.transpose() + noise;
+        let covariance = square - mean * mean.transpose() + noises.mean;
         let residual = origin.unwrap_or_else(SVector::zeros) + mean;
-        let nis = Cholesky::new(&covariance, "innovation covariance")?.mahalanobis(&residual);
+        let nis = near(Cholesky::new(&covariance, "innovation covariance")?.mahalanobis(&residual))?;
         Ok(Innovation::new(&residual, nis, top + sum.ln()))
+    }
+}
+
+/// The noises of one measurement at the places of particles, which are mostly all the same.
+struct Noises<const M: usize> {
+    last: Option<(SMatrix<f64, M, M>, Cholesky<M>)>,
+    /// The weighted mean of those added.
+    mean: SMatrix<f64, M, M>,
+    first: Option<SMatrix<f64, M, M>>,
+}
+
+impl<const M: usize> Default for Noises<M> {
+    fn default() -> Self {
+        Noises { last: None, mean: SMatrix::zeros(), first: None }
+    }
+}
+
+impl<const M: usize> Noises<M> {
+    /// Takes in the noise at a particle of this weight; the weights add up to one. Gives its factor.
+    #[inline]
+    fn add(&mut self, weight: f64, noise: &SMatrix<f64, M, M>) -> Result<Cholesky<M>, FilterError> {
+        match (&self.last, &self.first) {
+            (Some((last, factor)), Some(first)) if last == noise => {
+                if noise != first {
+                    self.mean += (noise - first) * weight;
+                }
+                Ok(*factor)
+            }
+            (_, first) => {
+                match first {
+                    Some(first) => self.mean += (noise - first) * weight,
+                    None => (self.first, self.mean) = (Some(*noise), *noise),
+                }
+                let factor = Cholesky::new(noise, "noise of the measurement")?;
+                self.last = Some((*noise, factor));
+                Ok(factor)
+            }
+        }
     }
 }
 
@@ -444,8 +318,27 @@ where
         belief.reshape(&target);
     }
 
-    fn reach(&self, belief: &Particles<N, T::Memory>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        super::gaussian::reach(&self.sensor, &belief.moments())
+    fn reach(&self, belief: &Particles<N, T::Memory>, search: &Search) -> Option<Region> {
+        if self.is_tentative(belief) {
+            return linear_reach(&self.sensor, &belief.moments(), search);
+        }
+        searched(&self.sensor, search, |sensor, probe| {
+            let origin = sensor.expected(&belief.states[0]);
+            let (mut mean, mut square) = (SVector::<f64, M>::zeros(), SVector::<f64, M>::zeros());
+            let mut noise = SVector::<f64, M>::zeros();
+            for (weight, state) in belief.weighted() {
+                let expected = sensor.expected(state);
+                let offset = sensor.difference(&expected, &origin);
+                mean += offset * weight;
+                square += offset.component_mul(&offset) * weight;
+                noise += sensor.read(probe, Some(&expected))?.noise.diagonal() * weight;
+            }
+            Ok((origin + mean, square - mean.component_mul(&mean) + noise))
+        })
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<M>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {
@@ -455,11 +348,6 @@ where
     fn area(&self, measurement: &Measurement<M>) -> f64 {
         self.sensor.area(measurement)
     }
-}
-
-/// A vector of independent standard normal components.
-fn normal<const N: usize>(random: &mut ChaCha8Rng) -> SVector<f64, N> {
-    SVector::from_fn(|_, _| StandardNormal.sample(random))
 }
 
 #[cfg(test)]

@@ -4,13 +4,15 @@ mod belief;
 mod random_turns;
 mod regime;
 
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::Vector2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::correction::{Comparison, predicted};
+use super::gaussian::linear_reach;
 use super::innovation::Blend;
 use super::{Estimate, Filter, Innovation, sampling};
+use crate::association::{Region, Search};
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 use crate::motion::Motion;
@@ -155,16 +157,13 @@ where
         belief: &mut Self::Belief,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
-        let reading = self.sensor.read(measurement);
         let mut blend = Blend::default();
         let mut failure = None;
         belief.correct(|ln_weight, state| {
-            let corrected = Comparison::of_reading(&self.sensor, state, &reading, measurement.age).and_then(
-                |comparison| {
-                    comparison.condition(&self.sensor, state)?;
-                    Ok(comparison.innovation)
-                },
-            );
+            let corrected = Comparison::new(&self.sensor, state, measurement).and_then(|comparison| {
+                comparison.condition(&self.sensor, state)?;
+                Ok(comparison.innovation)
+            });
             match corrected {
                 Ok(innovation) => blend.add_weighted(ln_weight.exp(), ln_weight, &innovation),
                 Err(error) => {
@@ -189,11 +188,10 @@ where
         belief: &Self::Belief,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
-        let reading = self.sensor.read(measurement);
         let mut blend = Blend::default();
         let mut failure = None;
         for (hypothesis, &ln_weight) in belief.particles().iter().zip(belief.ln_weights()) {
-            match Comparison::of_reading(&self.sensor, &hypothesis.state, &reading, measurement.age) {
+            match Comparison::new(&self.sensor, &hypothesis.state, measurement) {
                 Ok(comparison) => {
                     blend.add_weighted(ln_weight.exp(), ln_weight, &comparison.innovation);
                 }
@@ -233,8 +231,17 @@ where
         Estimate { mean, covariance, modes, extent: None }
     }
 
-    fn reach(&self, belief: &Self::Belief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        super::gaussian::reach(&self.sensor, &belief.moments())
+    /// That of all particles: the normalised square of the mixture is at least the least of theirs.
+    fn reach(&self, belief: &Self::Belief, search: &Search) -> Option<Region> {
+        Region::mixture(
+            belief.weighted().map(|(weight, particle)| {
+                Some((weight, linear_reach(&self.sensor, &particle.state, search)?))
+            }),
+        )
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<M>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {

@@ -2,9 +2,11 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::gaussian::gaussian_belief;
+use super::correction::near;
+use super::gaussian::{gaussian_belief, searched};
 use super::sigma::{Image, Points};
 use super::{Filter, Innovation, SigmaPoints};
+use crate::association::{Region, Search};
 use crate::belief::{Cholesky, Gaussian};
 use crate::error::FilterError;
 use crate::motion::Motion;
@@ -129,7 +131,27 @@ where
         Ok(Comparison::new(self, &self.points.draw(belief), measurement)?.innovation)
     }
 
+    fn reach(&self, belief: &Gaussian<N>, search: &Search) -> Option<Region> {
+        let points = self.points.draw(belief);
+        searched(&self.sensor, search, |sensor, probe| {
+            let image = readings(sensor, &self.points, &points);
+            let noise = sensor.read(probe, Some(&image.mean))?.noise;
+            Ok((image.mean, (image.covariance() + noise).diagonal()))
+        })
+    }
+
     gaussian_belief!(M);
+}
+
+/// The moments of what a sensor reads of sigma points.
+#[inline]
+fn readings<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    rule: &SigmaPoints,
+    points: &Points<N, N>,
+) -> Image<M, N> {
+    let readings = points.map(|state| sensor.expected(state));
+    readings.image(rule, |reading, centre| sensor.difference(reading, centre))
 }
 
 /// A measurement compared with the readings of sigma points.
@@ -148,16 +170,11 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         measurement: &Measurement<M>,
     ) -> Result<Self, FilterError> {
         let sensor = Aged::new(&filter.sensor, measurement.age);
-        let reading = sensor.read(measurement);
-        let image = points
-            .map(|state| sensor.expected(state))
-            .image(&filter.points, |reading, centre| sensor.difference(reading, centre));
+        let image = readings(&sensor, &filter.points, points);
+        let reading = sensor.read(measurement, Some(&image.mean))?;
         let residual = sensor.difference(&reading.value, &image.mean);
-        if !residual.iter().all(|x| x.is_finite()) {
-            return Err(FilterError::NotFinite { what: "innovation" });
-        }
         let factor = Cholesky::new(&(image.covariance() + reading.noise), "innovation covariance")?;
-        let nis = factor.mahalanobis(&residual);
+        let nis = near(factor.mahalanobis(&residual))?;
         let innovation = Innovation::new(&residual, nis, factor.ln_density(nis));
         Ok(Comparison { reading, residual, image, factor, innovation })
     }
@@ -203,7 +220,7 @@ mod tests {
         fn place(&self, _: &Measurement<1>) -> Option<nalgebra::Vector2<f64>> {
             None
         }
-        fn footprint(&self, _: &SVector<f64, 1>) -> Option<(nalgebra::Vector2<f64>, SMatrix<f64, 2, 2>)> {
+        fn region(&self, _: &SVector<f64, 1>, _: &SVector<f64, 1>) -> Option<Region> {
             None
         }
     }

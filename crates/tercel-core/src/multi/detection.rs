@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::Vector2;
 
+use crate::association::Region;
 use crate::error::FilterError;
 use crate::sensor::wrapped;
 
@@ -132,16 +133,16 @@ impl Detection {
         }
     }
 
-    /// How an object at `place`, known with the covariance `spread`, is seen; see [`probability`](Detection::probability). One
+    /// How an object is seen whose measurements are expected in this region; see [`probability`](Detection::probability). One
     /// that may lie on either side of the edge of a sector may be seen, and is not missed.
-    pub(super) fn sight(&self, place: Option<&Vector2<f64>>, spread: Option<&SMatrix<f64, 2, 2>>) -> Sight {
-        let seen = self.in_view(place);
+    pub(super) fn sight(&self, region: Option<&Region>) -> Sight {
+        let place = region.map(|region| region.centre);
+        let seen = self.in_view(place.as_ref());
         let missed = if self.reports { 0.0 } else { seen };
-        let (Some(sector), Some(place)) = (self.sector, place) else { return Sight { seen, missed } };
-        let offset = place - self.position;
-        let across = Vector2::new(-offset.y, offset.x) / offset.norm_squared().max(f64::MIN_POSITIVE);
-        let margin =
-            EDGE * spread.map_or(0.0, |spread| (across.transpose() * spread * across)[0].max(0.0).sqrt());
+        let (Some(sector), Some(region)) = (self.sector, region) else { return Sight { seen, missed } };
+        let offset = region.centre - self.position;
+        let room = 0.5 * (region.high - region.low).norm();
+        let margin = room / offset.norm().max(f64::MIN_POSITIVE);
         match sector.depth(&offset) {
             depth if depth > margin => Sight { seen, missed },
             depth if depth < -margin => Sight::default(),
@@ -157,9 +158,6 @@ impl Sector {
         0.5 * self.width - wrapped(offset.y.atan2(offset.x) - middle).abs()
     }
 }
-
-/// Standard deviations within which an object may lie beyond the edge of a sector.
-const EDGE: f64 = 3.0;
 
 /// How likely an object is seen, and how much it says when it is not.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -181,8 +179,8 @@ mod tests {
     fn what_lies_outside_the_sector_is_neither_seen_nor_missed() {
         // From 45 degrees before the negative x axis to 45 degrees behind it.
         let radar = Detection::uniform(0.9).unwrap().looking(0.75 * PI, 0.5 * PI);
-        let spread = SMatrix::identity() * 25.0;
-        let sight = |x, y| radar.sight(Some(&vector![x, y]), Some(&spread));
+        let spread = nalgebra::Matrix2::identity() * 25.0;
+        let sight = |x, y| radar.sight(Some(&Region::ellipse(vector![x, y], &spread, 9.0)));
         assert_eq!(sight(-1000.0, 10.0), Sight { seen: 0.9, missed: 0.9 });
         assert_eq!(sight(-1000.0, -10.0), Sight { seen: 0.9, missed: 0.9 });
         assert_eq!(sight(1000.0, 0.0), Sight { seen: 0.0, missed: 0.0 });

@@ -146,7 +146,7 @@ impl<B: Clone> Jpda<B> {
             .extend(scan.measurements.iter().map(|measurement| ln_clutter_at(filter, scan, measurement)));
         let mut compared: Vec<&F::Measurement> = Vec::new();
         for (row, track) in self.objects.active().enumerate() {
-            let (sight, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
+            let (sight, near) = vicinity.look(filter, &track.belief, scan);
             sights.push(sight);
             let prior = (track.existence * sight.seen).ln() - (1.0 - track.existence * sight.missed).ln();
             compared.clear();
@@ -246,7 +246,7 @@ impl<B: Clone> Tracker for Jpda<B> {
     {
         error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.objects.predict(filter, scan, self.config.survival, &self.config.management);
         self.associate(filter, scan);
         self.update(filter, scan);

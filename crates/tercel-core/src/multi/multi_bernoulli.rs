@@ -201,7 +201,7 @@ impl<B: Clone> MultiBernoulli<B> {
             let mut pairs: Vec<(usize, Term<B, ()>)> = Vec::new();
             let mut detected = 0.0;
             for term in &mut object.beliefs {
-                let (sight, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
+                let (sight, near) = vicinity.look(filter, &term.belief, scan);
                 detected += term.weight * sight.missed;
                 for &number in near {
                     let mut belief = term.belief.clone();
@@ -350,7 +350,7 @@ impl<B: Clone> Tracker for MultiBernoulli<B> {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
         self.roster.begin();
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.predict(filter, dt);
         self.contribute(filter, scan);
         self.collect(filter);

@@ -131,7 +131,7 @@ impl<B: Clone> NearestNeighbour<B> {
         misses.clear();
         sights.clear();
         for (row, track) in self.objects.active().enumerate() {
-            let (sight, near) = vicinity.look(filter, &track.belief, scan, &self.config.gate);
+            let (sight, near) = vicinity.look(filter, &track.belief, scan);
             sights.push(sight);
             misses.push(-(1.0 - track.existence * sight.missed).max(f64::MIN_POSITIVE).ln());
             for &column in near {
@@ -202,7 +202,7 @@ impl<B: Clone> Tracker for NearestNeighbour<B> {
     {
         error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.objects.predict(filter, scan, self.config.survival, &self.config.management);
         self.assign(filter, scan);
         self.update(filter, scan);

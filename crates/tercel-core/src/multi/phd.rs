@@ -171,7 +171,7 @@ impl<B: Clone> Phd<B> {
         explained.resize(scan.measurements.len(), 0.0);
         parents.clear();
         for (row, term) in self.terms.iter_mut().enumerate() {
-            let (sight, near) = vicinity.look(filter, &term.belief, scan, &self.config.gate);
+            let (sight, near) = vicinity.look(filter, &term.belief, scan);
             term.tag = Label { id: term.tag.id, measurement: None, in_view: sight.missed > 0.0 };
             for &number in near {
                 let mut belief = term.belief.clone();
@@ -253,7 +253,7 @@ impl<B: Clone> Tracker for Phd<B> {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
         self.roster.begin();
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.predict(filter, dt);
         self.update(filter, scan);
         let (merge, cap) = (self.config.merge, self.config.cap);

@@ -268,7 +268,7 @@ impl<B: Clone> Tracker for Pmbm<B> {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
         self.tracks.retain(|track| track.status != Status::Deleted);
-        self.scratch.vicinity.build(&places);
+        self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.predict(filter, dt);
         self.update(filter, scan, &places);
         // That nobody reported says nothing of those who were never seen.

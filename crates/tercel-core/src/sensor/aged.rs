@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector, Vector2};
 
 use super::{Measurement, Reading, Sensor};
+use crate::association::Region;
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
@@ -94,8 +95,12 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
     }
 
     #[inline]
-    fn read(&self, measurement: &Measurement<M>) -> Reading<M> {
-        self.sensor.read(measurement)
+    fn read(
+        &self,
+        measurement: &Measurement<M>,
+        expected: Option<&SVector<f64, M>>,
+    ) -> Result<Reading<M>, FilterError> {
+        self.sensor.read(measurement, expected)
     }
 
     #[inline]
@@ -117,8 +122,8 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
         self.sensor.place(measurement)
     }
 
-    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.sensor.footprint(&self.seen(state))
+    fn region(&self, expected: &SVector<f64, M>, half: &SVector<f64, M>) -> Option<Region> {
+        self.sensor.region(expected, half)
     }
 
     fn axes(&self) -> usize {

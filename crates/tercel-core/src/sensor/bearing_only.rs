@@ -3,7 +3,8 @@
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2, vector};
 
 use super::range_bearing::{cartesian, offset, polar_derivatives, rotated};
-use super::{Measurement, Sensor, finite, placed};
+use super::{Measurement, Sensor, placed};
+use crate::association::Region;
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
@@ -82,12 +83,12 @@ impl<const N: usize> Sensor<N, 1> for BearingOnly {
     }
 
     fn birth(&self, measurement: &Measurement<1>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError> {
-        finite(measurement)?;
+        measurement.check_finite()?;
         let (range, deviation) = self.range.ok_or(FilterError::NotInvertible {
             sensor: "bearing",
             reason: "there is no range; give one with its deviation, or start objects from another sensor",
         })?;
-        let noise = Sensor::<N, 1>::read(self, measurement).noise[(0, 0)];
+        let noise = Sensor::<N, 1>::read(self, measurement, None)?.noise[(0, 0)];
         let bearing = measurement.value[0];
         let polar = Matrix2::from_diagonal(&vector![deviation * deviation, noise]);
         let place = self.position + cartesian(range, bearing);
@@ -98,7 +99,7 @@ impl<const N: usize> Sensor<N, 1> for BearingOnly {
         None
     }
 
-    fn footprint(&self, _: &SVector<f64, N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn region(&self, _: &Vector1<f64>, _: &Vector1<f64>) -> Option<Region> {
         None
     }
 }

@@ -2,6 +2,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::belief::Cholesky;
+use crate::error::FilterError;
+
 /// One measurement of `M` components, with its own noise covariance when the sensor reports one.
 ///
 /// ```
@@ -58,6 +61,27 @@ impl<const M: usize> Measurement<M> {
     /// ```
     pub fn with_age(self, age: f64) -> Self {
         Measurement { age, ..self }
+    }
+
+    /// The noise covariance that came with the measurement, if one did.
+    ///
+    /// # Errors
+    /// When it is not positive definite. An error of zero is not one that a measurement can have.
+    #[inline]
+    pub fn own_noise(&self) -> Result<Option<&SMatrix<f64, M, M>>, FilterError> {
+        if let Some(noise) = &self.noise {
+            Cholesky::new(noise, "noise of the measurement")?;
+        }
+        Ok(self.noise.as_ref())
+    }
+
+    /// Fails when the value, the noise or the age holds a number that is not finite.
+    pub(super) fn check_finite(&self) -> Result<(), FilterError> {
+        let noise_is_finite = self.noise.is_none_or(|noise| noise.iter().all(|x| x.is_finite()));
+        if noise_is_finite && self.age.is_finite() && self.value.iter().all(|x| x.is_finite()) {
+            return Ok(());
+        }
+        Err(FilterError::NotFinite { what: "measurement" })
     }
 }
 

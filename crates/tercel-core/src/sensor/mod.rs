@@ -9,7 +9,8 @@
 //! | [`BearingOnly`] | bearing |
 //!
 //! Bearings are mathematical: zero along `x`, counter-clockwise. Every sensor stands somewhere and may be moved between
-//! scans: sensors are small values, so a moved one is simply a new one.
+//! scans: sensors are small values, so a moved one is simply a new one. Polar sensors see the plane: slant ranges of objects at a
+//! height are turned into [ranges over ground](ground_range) before.
 
 mod aged;
 mod bearing_only;
@@ -18,11 +19,13 @@ mod measurement;
 mod position;
 mod range_bearing;
 mod range_bearing_rate;
+mod slant;
 
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
+use crate::association::Region;
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
@@ -33,10 +36,11 @@ pub use measurement::{Measurement, Reading};
 pub use position::Position;
 pub use range_bearing::RangeBearing;
 pub use range_bearing_rate::RangeBearingRate;
+pub use slant::ground_range;
 
 /// A sensor that measures `M` components of a state of `N` components.
 ///
-/// The state begins with positions, as [`Gaussian`] says. `expected`, `jacobian` and `footprint` are those of a measurement
+/// The state begins with positions, as [`Gaussian`] says. `expected` and `jacobian` are those of a measurement
 /// that was taken at the time of the state; [`Aged`] makes those of an older one of them.
 pub trait Sensor<const N: usize, const M: usize> {
     /// What the sensor would read of an object in this state, without noise.
@@ -57,13 +61,24 @@ pub trait Sensor<const N: usize, const M: usize> {
     fn noise(&self, expected: &SVector<f64, M>) -> SMatrix<f64, M, M>;
 
     /// A measurement as a reading. The default takes its value as it is and prefers its own noise.
+    ///
+    /// `expected` is what the sensor would have read of the object that the measurement is compared with. Where the noise
+    /// depends on the object's place it is that of the expected one: it then does not depend on the error of this very
+    /// measurement, which would bias the estimate. Without a prediction, at a birth, the measurement stands for it.
+    ///
+    /// # Errors
+    /// When the measurement's own noise is not positive definite.
     #[inline]
-    fn read(&self, measurement: &Measurement<M>) -> Reading<M> {
-        let noise = match measurement.noise {
-            Some(noise) => noise,
-            None => self.noise(&measurement.value),
+    fn read(
+        &self,
+        measurement: &Measurement<M>,
+        expected: Option<&SVector<f64, M>>,
+    ) -> Result<Reading<M>, FilterError> {
+        let noise = match measurement.own_noise()? {
+            Some(noise) => *noise,
+            None => self.noise(expected.unwrap_or(&measurement.value)),
         };
-        Reading { value: measurement.value, noise }
+        Ok(Reading { value: measurement.value, noise })
     }
 
     /// Which components of a reading are angles, and so periodic.
@@ -94,11 +109,11 @@ pub trait Sensor<const N: usize, const M: usize> {
     /// Where in the plane (`x, y`) the object was when it was measured, if the measurement says so.
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>>;
 
-    /// Where in the plane a measurement of an object in this state is expected, and the covariance of the error of its
-    /// [`place`](Sensor::place). Gates are searched in the plane with it before readings are compared.
+    /// The region of the plane that holds the [`place`](Sensor::place) of every measurement whose reading differs from
+    /// `expected` by at most `half` in each component. Gates are searched in it before readings are compared.
     ///
     /// `None` for sensors that do not say where an object is.
-    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)>;
+    fn region(&self, expected: &SVector<f64, M>, half: &SVector<f64, M>) -> Option<Region>;
 
     /// Number of positions at the beginning of the state, which as many velocities follow: what an
     /// [age](Measurement::age) is applied to. The default is 2, the plane.
@@ -131,8 +146,12 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
     fn noise(&self, expected: &SVector<f64, M>) -> SMatrix<f64, M, M> {
         (**self).noise(expected)
     }
-    fn read(&self, measurement: &Measurement<M>) -> Reading<M> {
-        (**self).read(measurement)
+    fn read(
+        &self,
+        measurement: &Measurement<M>,
+        expected: Option<&SVector<f64, M>>,
+    ) -> Result<Reading<M>, FilterError> {
+        (**self).read(measurement, expected)
     }
     fn periodic(&self) -> [bool; M] {
         (**self).periodic()
@@ -146,8 +165,8 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {
         (**self).place(measurement)
     }
-    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        (**self).footprint(state)
+    fn region(&self, expected: &SVector<f64, M>, half: &SVector<f64, M>) -> Option<Region> {
+        (**self).region(expected, half)
     }
     fn axes(&self) -> usize {
         (**self).axes()
@@ -195,15 +214,6 @@ fn placed<const N: usize>(
         }
     }
     belief
-}
-
-/// Fails on a measurement that holds a number that is not finite.
-fn finite<const M: usize>(measurement: &Measurement<M>) -> Result<(), FilterError> {
-    let noise_is_finite = measurement.noise.is_none_or(|noise| noise.iter().all(|x| x.is_finite()));
-    if noise_is_finite && measurement.age.is_finite() && measurement.value.iter().all(|x| x.is_finite()) {
-        return Ok(());
-    }
-    Err(FilterError::NotFinite { what: "measurement" })
 }
 
 #[cfg(test)]

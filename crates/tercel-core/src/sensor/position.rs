@@ -2,7 +2,8 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::{Measurement, Sensor, finite, picked};
+use super::{Measurement, Sensor, picked};
+use crate::association::Region;
 use crate::belief::{Cholesky, Gaussian};
 use crate::error::FilterError;
 
@@ -32,7 +33,11 @@ use crate::error::FilterError;
 pub struct Position<const M: usize = 2> {
     noise: SMatrix<f64, M, M>,
     lag: f64,
+    clutter_heights: f64,
 }
+
+/// Heights of clutter when nothing is said, m.
+const CLUTTER_HEIGHTS: f64 = 10_000.0;
 
 impl<const M: usize> Position<M> {
     /// A standard deviation of `deviation` metres on every axis.
@@ -41,7 +46,7 @@ impl<const M: usize> Position<M> {
     /// When it is not positive and finite.
     pub fn new(deviation: f64) -> Result<Self, FilterError> {
         let deviation = FilterError::positive("position deviation", deviation)?;
-        Ok(Position { noise: SMatrix::identity() * (deviation * deviation), lag: 0.0 })
+        Position::with_noise(SMatrix::identity() * (deviation * deviation))
     }
 
     /// Any noise covariance, m².
@@ -50,12 +55,22 @@ impl<const M: usize> Position<M> {
     /// When it is not positive definite.
     pub fn with_noise(noise: SMatrix<f64, M, M>) -> Result<Self, FilterError> {
         Cholesky::new(&noise, "position noise")?;
-        Ok(Position { noise, lag: 0.0 })
+        Ok(Position { noise, lag: 0.0, clutter_heights: CLUTTER_HEIGHTS })
     }
 
     /// Says that positions are `lag` seconds old when they are reported. States without velocities ignore it.
     pub fn with_lag(self, lag: f64) -> Self {
         Position { lag, ..self }
+    }
+
+    /// Sets the width of the interval over which heights of clutter are spread evenly, m. The default is 10,000. It counts for
+    /// positions in space alone, whose likelihoods are per m³ where [`Clutter`](crate::multi::Clutter) is per m² of the plane.
+    ///
+    /// # Errors
+    /// When it is not positive and finite.
+    pub fn with_clutter_heights(self, width: f64) -> Result<Self, FilterError> {
+        let clutter_heights = FilterError::positive("width of the heights of clutter", width)?;
+        Ok(Position { clutter_heights, ..self })
     }
 
     /// The lag, if the state has velocities to apply it to.
@@ -93,8 +108,8 @@ impl<const N: usize, const M: usize> Sensor<N, M> for Position<M> {
     }
 
     fn birth(&self, measurement: &Measurement<M>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError> {
-        finite(measurement)?;
-        let reading = Sensor::<N, M>::read(self, measurement);
+        measurement.check_finite()?;
+        let reading = Sensor::<N, M>::read(self, measurement, None)?;
         // p = z + τ v + noise: the position inherits the prior of the velocity through the lag.
         let lag = if N >= 2 * M { self.lag + measurement.age } else { 0.0 };
         let mut spread = SMatrix::<f64, N, N>::identity();
@@ -126,9 +141,16 @@ impl<const N: usize, const M: usize> Sensor<N, M> for Position<M> {
         (M >= 2).then(|| Vector2::new(measurement.value[0], measurement.value[1]))
     }
 
-    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        let expected: SVector<f64, M> = self.expected(state);
-        (M >= 2)
-            .then(|| (Vector2::new(expected[0], expected[1]), SMatrix::from_fn(|i, j| self.noise[(i, j)])))
+    fn region(&self, expected: &SVector<f64, M>, half: &SVector<f64, M>) -> Option<Region> {
+        let plane = |place: SVector<f64, M>| Vector2::new(place[0], place[1]);
+        (M >= 2).then(|| Region {
+            centre: plane(*expected),
+            low: plane(expected - half),
+            high: plane(expected + half),
+        })
+    }
+
+    fn area(&self, _: &Measurement<M>) -> f64 {
+        if M == 3 { 1.0 / self.clutter_heights } else { 1.0 }
     }
 }

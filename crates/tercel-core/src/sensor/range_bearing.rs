@@ -1,8 +1,11 @@
 //! A sensor of range and bearing.
 
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, matrix, vector};
 
-use super::{Measurement, Sensor, finite, placed};
+use super::{Measurement, Sensor, placed};
+use crate::association::Region;
 use crate::belief::Gaussian;
 use crate::error::FilterError;
 
@@ -88,8 +91,8 @@ impl<const N: usize> Sensor<N, 2> for RangeBearing {
     }
 
     fn birth(&self, measurement: &Measurement<2>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError> {
-        finite(measurement)?;
-        let noise = Sensor::<N, 2>::read(self, measurement).noise;
+        measurement.check_finite()?;
+        let noise = Sensor::<N, 2>::read(self, measurement, None)?.noise;
         let (range, bearing) = (measurement.value[0], measurement.value[1]);
         let place = self.position + cartesian(range, bearing);
         Ok(placed(prior, &place, &rotated(range, bearing, &noise)).moved_on(2, measurement.age))
@@ -99,15 +102,40 @@ impl<const N: usize> Sensor<N, 2> for RangeBearing {
         Some(self.position + cartesian(measurement.value[0], measurement.value[1]))
     }
 
-    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        let expected: Vector2<f64> = Sensor::<N, 2>::expected(self, state);
-        let noise = Sensor::<N, 2>::noise(self, &expected);
-        Some((vector![state[0], state[1]], rotated(expected[0], expected[1], &noise)))
+    fn region(&self, expected: &Vector2<f64>, half: &Vector2<f64>) -> Option<Region> {
+        let Region { centre, low, high } = sector(expected, half);
+        Some(Region { centre: self.position + centre, low: self.position + low, high: self.position + high })
     }
 
+    /// That at the measured range, or where this is less than its error at a range of its deviation.
     fn area(&self, measurement: &Measurement<2>) -> f64 {
-        measurement.value[0].abs()
+        let own = measurement.noise.map_or(self.range, |noise| noise[(0, 0)].max(0.0).sqrt());
+        measurement.value[0].abs().max(own)
     }
+}
+
+/// The region that holds all points whose range and bearing differ from `centre` by at most `half`: the box around a sector of
+/// a ring, whatever its direction.
+fn sector(centre: &Vector2<f64>, half: &Vector2<f64>) -> Region {
+    let (near, far) = (centre[0] - half[0], centre[0] + half[0]);
+    let (first, last) = (centre[1] - half[1], centre[1] + half[1]);
+    let place = cartesian(centre[0], centre[1]);
+    // A range below zero lies opposite.
+    if near < 0.0 || !(half[1] < PI) {
+        let reach = Vector2::repeat(far.max(-near));
+        return Region { centre: place, low: -reach, high: reach };
+    }
+    let corners = [(near, first), (near, last), (far, first), (far, last)];
+    // Between the corners the outer arc is farthest out where it crosses an axis.
+    let crossings = (0..4).map(|i| f64::from(i) * FRAC_PI_2).filter(|axis| {
+        let ahead = (axis - first).rem_euclid(TAU);
+        ahead <= last - first
+    });
+    let points = corners.into_iter().chain(crossings.map(|axis| (far, axis)));
+    points.map(|(range, bearing)| cartesian(range, bearing)).fold(
+        Region { centre: place, low: place, high: place },
+        |region, point| Region { low: region.low.inf(&point), high: region.high.sup(&point), ..region },
+    )
 }
 
 /// From the sensor to the object, in the plane.

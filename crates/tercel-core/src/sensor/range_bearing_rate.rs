@@ -3,7 +3,8 @@
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3, vector};
 
 use super::range_bearing::{offset, polar_derivatives};
-use super::{Measurement, RangeBearing, Sensor};
+use super::{Measurement, RangeBearing, Reading, Sensor};
+use crate::association::Region;
 use crate::belief::{Cholesky, Gaussian};
 use crate::error::FilterError;
 
@@ -14,7 +15,7 @@ use crate::error::FilterError;
 /// ## Model
 /// With `d = p - s` and `u = v - w` for a sensor at `s` that moves with velocity `w`:
 /// ```text
-/// z = (|d|, atan2(dy, dx), dᵀu / |d|) + noise,        noise ~ N(0, diag(σr², σθ², σd²))
+/// z = (|d|, atan2(dy, dx), dᵀu / |d|) + noise,        noise ~ N(0, diag(σr², σθ², σd² + σw²))
 /// ```
 ///
 /// ## Use it when
@@ -37,6 +38,7 @@ pub struct RangeBearingRate {
     polar: RangeBearing,
     rate: f64,
     velocity: Vector2<f64>,
+    velocity_variance: f64,
     clutter_rates: f64,
 }
 
@@ -50,6 +52,7 @@ impl RangeBearingRate {
             polar: RangeBearing::new(range, bearing)?,
             rate: FilterError::positive("range rate deviation", rate)?,
             velocity: Vector2::zeros(),
+            velocity_variance: 0.0,
             clutter_rates: 100.0,
         })
     }
@@ -57,6 +60,23 @@ impl RangeBearingRate {
     /// Moves the sensor to `position` (m), with `velocity` (m/s).
     pub fn at(self, position: Vector2<f64>, velocity: Vector2<f64>) -> Self {
         RangeBearingRate { polar: self.polar.at(position), velocity, ..self }
+    }
+
+    /// Says how well the sensor's own velocity is known: its standard deviation on every axis, m/s. The variance adds to that of
+    /// every range rate, also of those that bring their own, for the velocity along the line of sight is what a range rate
+    /// is corrected by. The default is 0.
+    ///
+    /// The error is common to the measurements of a scan; a filter that takes them one object at a time need not know.
+    ///
+    /// # Errors
+    /// When it is negative or not finite.
+    pub fn with_velocity_deviation(self, deviation: f64) -> Result<Self, FilterError> {
+        if deviation >= 0.0 && deviation.is_finite() {
+            return Ok(RangeBearingRate { velocity_variance: deviation * deviation, ..self });
+        }
+        let (parameter, expected) =
+            ("deviation of the sensor's velocity", "must be finite and not negative, m/s");
+        Err(FilterError::Parameter { parameter, value: deviation, expected })
     }
 
     /// Sets the width of the interval over which range rates of clutter are spread evenly, m/s. The default is 100.
@@ -108,7 +128,22 @@ impl<const N: usize> Sensor<N, 3> for RangeBearingRate {
 
     fn noise(&self, expected: &Vector3<f64>) -> Matrix3<f64> {
         let polar: Matrix2<f64> = Sensor::<N, 2>::noise(&self.polar, &vector![expected[0], expected[1]]);
-        Matrix3::from_diagonal(&vector![polar[(0, 0)], polar[(1, 1)], self.rate * self.rate])
+        let rate = self.rate * self.rate + self.velocity_variance;
+        Matrix3::from_diagonal(&vector![polar[(0, 0)], polar[(1, 1)], rate])
+    }
+
+    fn read(
+        &self,
+        measurement: &Measurement<3>,
+        expected: Option<&Vector3<f64>>,
+    ) -> Result<Reading<3>, FilterError> {
+        let value = measurement.value;
+        let Some(mut noise) = measurement.own_noise()?.copied() else {
+            return Ok(Reading { value, noise: Sensor::<N, 3>::noise(self, expected.unwrap_or(&value)) });
+        };
+        // The measurement knows nothing of how well the sensor's own velocity is known.
+        noise[(2, 2)] += self.velocity_variance;
+        Ok(Reading { value, noise })
     }
 
     fn periodic(&self) -> [bool; 3] {
@@ -116,12 +151,12 @@ impl<const N: usize> Sensor<N, 3> for RangeBearingRate {
     }
 
     fn birth(&self, measurement: &Measurement<3>, prior: &Gaussian<N>) -> Result<Gaussian<N>, FilterError> {
-        super::finite(measurement)?;
+        measurement.check_finite()?;
         let mut belief = self.polar.birth(&Self::polar_part(measurement), prior)?;
         // The range rate is linear in the velocity at the measured position: one scalar Kalman update.
         let row = Sensor::<N, 3>::jacobian(self, &belief.mean).row(2).into_owned();
         let expected = Sensor::<N, 3>::expected(self, &belief.mean)[2];
-        let noise = Sensor::<N, 3>::read(self, measurement).noise[(2, 2)];
+        let noise = Sensor::<N, 3>::read(self, measurement, None)?.noise[(2, 2)];
         let cross = belief.covariance * row.transpose();
         let innovation = SMatrix::<f64, 1, 1>::new((row * cross)[0] + noise);
         let gain = Cholesky::new(&innovation, "range rate innovation")?.right_solve(&cross);
@@ -136,11 +171,11 @@ impl<const N: usize> Sensor<N, 3> for RangeBearingRate {
         Sensor::<2, 2>::place(&self.polar, &Self::polar_part(measurement))
     }
 
-    fn footprint(&self, state: &SVector<f64, N>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        Sensor::<N, 2>::footprint(&self.polar, state)
+    fn region(&self, expected: &Vector3<f64>, half: &Vector3<f64>) -> Option<Region> {
+        Sensor::<N, 2>::region(&self.polar, &expected.xy(), &half.xy())
     }
 
     fn area(&self, measurement: &Measurement<3>) -> f64 {
-        measurement.value[0].abs() / self.clutter_rates
+        Sensor::<N, 2>::area(&self.polar, &Self::polar_part(measurement)) / self.clutter_rates
     }
 }

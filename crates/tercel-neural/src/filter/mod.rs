@@ -50,6 +50,7 @@ pub use tr_mtt::{Frame, TrMtt, TrMttBelief, TrMttHyper, TransformerNetwork};
 
 use nalgebra::{Vector2, Vector4};
 use serde::de::DeserializeOwned;
+use tercel_core::error::FilterError;
 use tercel_core::sensor::{Aged, Measurement, Sensor};
 
 use crate::error::ModelError;
@@ -96,9 +97,13 @@ pub fn check(model: &Model) -> Result<(), ModelError> {
 
 /// What a sensor would read now of an object that it measured some seconds ago and that is in this state: networks compare the
 /// readings of different scans.
-fn present(sensor: &impl Sensor<4, 2>, measurement: &Measurement<2>, state: &Vector4<f64>) -> Vector2<f64> {
-    let moved = sensor.expected(state) - Aged::new(sensor, measurement.age).expected(state);
-    sensor.read(measurement).value + moved
+fn present(
+    sensor: &impl Sensor<4, 2>,
+    measurement: &Measurement<2>,
+    state: &Vector4<f64>,
+) -> Result<Vector2<f64>, FilterError> {
+    let then = Aged::new(sensor, measurement.age).expected(state);
+    Ok(sensor.read(measurement, Some(&then))?.value + (sensor.expected(state) - then))
 }
 
 /// The options of a model's card, if they make sense.

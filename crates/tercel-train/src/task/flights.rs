@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector2;
 use rand::RngExt;
 use serde::Deserialize;
-use tercel_core::sensor::{ConvertedPolar, Measurement, Sensor};
+use tercel_core::sensor::ConvertedPolar;
 use tercel_sim::air_traffic::{AirTraffic, Flight, NAMES, Radar};
 
 use crate::TrainError;
@@ -222,9 +222,7 @@ impl Flights {
             Conversion::Debiased => converter,
             Conversion::Plain => converter.biased(),
         };
-        let read = |plot: &Vector2<f64>| {
-            Sensor::<4, 2>::read(&converter, &Measurement::from([plot.x, plot.y])).value
-        };
+        let read = |plot: &Vector2<f64>| converter.convert(plot).value;
         let first = plots.first().and_then(Option::as_ref).map(read);
         let origin = first.ok_or_else(|| fault(&"its first step was not seen"))?;
         let readings = plots.iter().map(|plot| plot.as_ref().map(read));

@@ -33,9 +33,10 @@ struct Messages<'a> {
 pub(super) fn solve(local: &mut Local) {
     let mut messages = Messages::new(local);
     messages.converge();
-    let plain = messages.probabilities();
+    let mut plain = messages.probabilities();
     let mut region = Region::new(local);
     if region.by_column.iter().map(|entries| entries.len() * entries.len()).sum::<usize>() > CROWD {
+        share_out(local, &mut plain);
         local.result = plain;
         return;
     }
@@ -45,7 +46,19 @@ pub(super) fn solve(local: &mut Local) {
         let range = local.starts[row]..local.starts[row + 1];
         result[range].copy_from_slice(region.solve(&messages));
     }
+    share_out(local, &mut result);
     local.result = result;
+}
+
+/// Reduces the claims to each column that exceed the whole of it: each row has looked at its own surroundings.
+fn share_out(local: &Local, result: &mut [f64]) {
+    let mut claimed = vec![0.0; local.columns];
+    for (entry, probability) in local.entries.iter().zip(&*result) {
+        claimed[entry.column] += probability;
+    }
+    for (entry, probability) in local.entries.iter().zip(result) {
+        *probability /= f64::max(claimed[entry.column], 1.0);
+    }
 }
 
 impl<'a> Messages<'a> {

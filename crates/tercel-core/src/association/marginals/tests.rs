@@ -53,6 +53,45 @@ fn propagation_meets_enumeration_within_a_hundredth_on_a_thousand_clusters() {
     assert!(worst < 1e-2, "{worst}");
 }
 
+/// Rows that all want all columns, with weights over e^±8.
+fn crowd(random: &mut ChaCha8Rng, size: usize) -> Vec<(usize, usize, f64)> {
+    let pairs = (0..size).flat_map(|row| (0..size).map(move |column| (row, column)));
+    pairs.map(|(row, column)| (row, column, random.random_range(-8.0..8.0))).collect()
+}
+
+#[test]
+fn sums_over_sets_of_columns_are_those_over_all_assignments() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    // One assignment would be enumerated; everything else goes by sets.
+    let (mut exact, mut by_sets) = (Marginals::with_exact(usize::MAX), Marginals::with_exact(100));
+    for round in 0..60 {
+        let mut pairs = crowd(&mut random, 5);
+        pairs.extend([(0, 5, 1.0), (3, 6, 2.0), (3, 7, -1.0)]);
+        pairs.retain(|_| round % 2 == 0 || random.random::<f64>() < 0.8);
+        exact.solve(&pairs, 5, 8);
+        by_sets.solve(&pairs, 5, 8);
+        for (a, b) in exact.pairs().iter().zip(by_sets.pairs()) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn no_column_is_claimed_by_more_than_one_in_all() {
+    let mut random = ChaCha8Rng::seed_from_u64(6);
+    for size in [8, 8, 8, 12, 14, 20] {
+        for exact in [0, 4096] {
+            let pairs = crowd(&mut random, size);
+            let mut marginals = Marginals::with_exact(exact);
+            marginals.solve(&pairs, size, size);
+            let mut claimed = vec![0.0; size];
+            pairs.iter().zip(marginals.pairs()).for_each(|(pair, p)| claimed[pair.1] += p);
+            assert!(claimed.iter().all(|sum| *sum <= 1.0 + 1e-9), "{size}, {exact}: {claimed:?}");
+            assert!(claimed.iter().sum::<f64>() > 0.8 * size as f64, "{size}, {exact}: {claimed:?}");
+        }
+    }
+}
+
 #[test]
 fn conflicts_share_out_what_there_is() {
     // Two equal rows and one column: 1 + w + w.

@@ -85,6 +85,25 @@ fn a_cloud_without_extent_is_drawn_anew_when_it_is_reshaped() {
 }
 
 #[test]
+fn particles_do_not_run_out_when_the_process_noise_is_small() {
+    let filter =
+        Particle::new(ConstantVelocity::new(0.01), Position::<2>::new(0.1).unwrap(), 1000, 1).unwrap();
+    let follow = |filter: &Particle<ConstantVelocity, Position<2>>| -> (f64, f64) {
+        let mut belief: Particles<4> = filter.birth(&[0.0, 0.0].into()).unwrap();
+        for second in 1..60 {
+            filter.predict(&mut belief, 1.0);
+            filter.update(&mut belief, &[3.0 * f64::from(second), 0.0].into()).unwrap();
+        }
+        let state = filter.state(&belief);
+        ((state.mean[0] - 177.0).abs(), state.deviations()[0])
+    };
+    let (error, deviation) = follow(&filter);
+    assert!(deviation > 0.03 && deviation < 0.2 && error < 4.0 * deviation, "{error} {deviation}");
+    let plain = follow(&filter.with_smoothing(0.0).unwrap());
+    assert!(plain.1 < 0.01 * deviation, "{plain:?}");
+}
+
+#[test]
 fn too_few_particles_are_refused() {
     let radar = Position::<2>::new(5.0).unwrap();
     assert!(Particle::<_, _, 2>::new(ConstantVelocity::new(1.0), radar, 3, 0).is_err());

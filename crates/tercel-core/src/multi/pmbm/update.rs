@@ -84,8 +84,9 @@ impl<B: Clone> Pmbm<B> {
         let mut all = Vec::with_capacity(scan.measurements.len());
         let mut ln_intensities = Vec::with_capacity(scan.measurements.len());
         for (number, (measurement, place)) in scan.measurements.iter().zip(places).enumerate() {
-            let sight = scan.detection.sight(place.as_ref(), None);
-            let objects = sight.seen * self.undetected.intensity(place.as_ref()) * filter.area(measurement);
+            let seen = scan.detection.probability(place.as_ref());
+            let missed = if scan.detection.is_reports() { 0.0 } else { seen };
+            let objects = seen * self.undetected.intensity(place.as_ref()) * filter.area(measurement);
             let ln_clutter = ln_clutter_at(filter, scan, measurement);
             let ln_intensity =
                 ln_clutter.max(objects.ln()) + (-(ln_clutter - objects.ln()).abs()).exp().ln_1p();
@@ -96,7 +97,7 @@ impl<B: Clone> Pmbm<B> {
             let object = belief.map(|belief| {
                 let label = self.next;
                 self.next += 1;
-                (label, Leaf { existence, belief, measurement: Some(number), detection: sight.missed })
+                (label, Leaf { existence, belief, measurement: Some(number), detection: missed })
             });
             all.push(Fresh { object });
             ln_intensities.push(ln_intensity);
@@ -115,7 +116,7 @@ impl<B: Clone> Pmbm<B> {
             for tree in 0..group.trees.len() {
                 let shares = group.shares(tree);
                 for (leaf, here) in group.trees[tree].leaves.iter_mut().enumerate() {
-                    let (sight, near) = vicinity.look(filter, &here.belief, scan, &self.config.gate);
+                    let (sight, near) = vicinity.look(filter, &here.belief, scan);
                     here.detection = sight.missed;
                     let ln_prior = (here.existence * sight.seen).ln() - ln_not(here.existence * sight.missed);
                     for &measurement in near {

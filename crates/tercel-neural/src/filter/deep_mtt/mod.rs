@@ -5,7 +5,8 @@ mod network;
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, Vector2, Vector4};
+use nalgebra::{Vector2, Vector4};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Filter, Innovation, Unscented};
@@ -316,8 +317,12 @@ impl<S: Sensor<4, 2>> Filter<4> for DeepMtt<S> {
         }
     }
 
-    fn reach(&self, belief: &DeepMttBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.front.reach(&belief.front)
+    fn reach(&self, belief: &DeepMttBelief, search: &Search) -> Option<Region> {
+        self.front.reach(&belief.front, search)
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<2>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<2>) -> Option<Vector2<f64>> {

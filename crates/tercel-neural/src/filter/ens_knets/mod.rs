@@ -9,7 +9,8 @@ mod offline;
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, Vector2, Vector4};
+use nalgebra::{Vector2, Vector4};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Estimate, Extended, Filter, Innovation};
@@ -176,12 +177,12 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
     /// Lets a copy of each KalmanNet take the measurement.
     fn follow(&self, belief: &mut EnsKNetsBelief, measurement: &Measurement<2>) -> Result<(), FilterError> {
         let sensor = Aged::new(&self.sensor, measurement.age);
-        let noise = sensor.read(measurement).noise;
         for ((next, mode), net) in belief.next.iter_mut().zip(&belief.modes).zip(&self.nets) {
             next.copy(mode);
             let before = net.state(&next.net);
             let innovation = net.update(&mut next.net, measurement)?;
             let jacobian = sensor.jacobian(&before.mean);
+            let noise = sensor.read(measurement, Some(&sensor.expected(&before.mean)))?.noise;
             next.evidence = Evidence {
                 state: net.state(&next.net).mean,
                 residual: Vector2::new(innovation.residual()[0], innovation.residual()[1]),
@@ -194,7 +195,7 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
     }
 
     /// Lets the branches see what the copies of the KalmanNets made of the measurement.
-    fn think(&self, belief: &mut EnsKNetsBelief, measurement: &Measurement<2>) {
+    fn think(&self, belief: &mut EnsKNetsBelief, measurement: &Measurement<2>) -> Result<(), FilterError> {
         let EnsKNetsBelief { next: modes, memory, features, inputs, outputs, waited, anchor, .. } = belief;
         let (mut mean, mut attended, mut total) = (Vector4::zeros(), Vector4::zeros(), 0.0);
         for mode in modes.iter() {
@@ -206,8 +207,8 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
             modes,
             mean,
             attended: attended / total,
-            reading: present(&self.sensor, measurement, &mean),
-            noise: self.sensor.read(measurement).noise,
+            reading: present(&self.sensor, measurement, &mean)?,
+            noise: self.sensor.read(measurement, Some(&self.sensor.expected(&mean)))?.noise,
             origin: self.origin,
             anchor: *anchor,
             waited: *waited,
@@ -223,6 +224,7 @@ impl<S: LinearSensor<4, 2>> EnsKNets<S> {
             outputs.fill(0.0);
         }
         self.answer(outputs, &sight, modes);
+        Ok(())
     }
 
     /// Turns outputs of the branches into corrections and probabilities.
@@ -260,7 +262,8 @@ impl<S: LinearSensor<4, 2>> Filter<4> for EnsKNets<S> {
                 Ok(Mode::new(born, state, self.nets.len()))
             })
             .collect();
-        Ok(EnsKNetsBelief::new(&self.network, modes?, self.sensor.read(measurement).value))
+        let place = self.sensor.read(measurement, None)?.value;
+        Ok(EnsKNetsBelief::new(&self.network, modes?, place))
     }
 
     fn predict(&self, belief: &mut EnsKNetsBelief, dt: f64) {
@@ -289,7 +292,7 @@ impl<S: LinearSensor<4, 2>> Filter<4> for EnsKNets<S> {
         if let Some(attention) = &self.network.hyper().attention {
             attention.weigh(&mut belief.next, &mut belief.level);
         }
-        self.think(belief, measurement);
+        self.think(belief, measurement)?;
         std::mem::swap(&mut belief.modes, &mut belief.next);
         belief.waited = 0.0;
         Ok(innovation)
@@ -367,8 +370,12 @@ impl<S: LinearSensor<4, 2>> Filter<4> for EnsKNets<S> {
         Estimate { mean, covariance, modes: belief.probabilities().collect(), extent: None }
     }
 
-    fn reach(&self, belief: &EnsKNetsBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.classical(0).reach(&self.state(belief))
+    fn reach(&self, belief: &EnsKNetsBelief, search: &Search) -> Option<Region> {
+        self.classical(0).reach(&self.state(belief), search)
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<2>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<2>) -> Option<Vector2<f64>> {

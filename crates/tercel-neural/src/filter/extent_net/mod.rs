@@ -7,6 +7,7 @@ mod network;
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::extended::{
@@ -253,11 +254,13 @@ impl Filter<4> for ExtentNet {
         Estimate { extent: Some(belief.matrix()), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &ExtentNetBelief) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn reach(&self, belief: &ExtentNetBelief, search: &Search) -> Option<Region> {
         let spread = self.scattering.spread(&belief.matrix());
         let covariance = belief.state.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-        Some((belief.state.mean.xy(), covariance + spread))
+        Some(search.around(belief.state.mean.xy(), &(covariance + spread)))
     }
+
+    fn widen(&self, _: &mut Search, _: &Points) {}
 
     fn place(&self, points: &Points) -> Option<Vector2<f64>> {
         (!points.is_empty()).then(|| points.mean())

@@ -8,7 +8,8 @@ mod stacked;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix4, Matrix4x2, SMatrix, Vector2};
+use nalgebra::{Matrix4, Matrix4x2, Vector2};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Extended, Filter, Innovation};
@@ -168,11 +169,11 @@ impl<T: Motion<4>, S: LinearSensor<4, 2>> KalmanNet<T, S> {
         state: &Gaussian<4>,
         gain: &Matrix4x2<f64>,
         measurement: &Measurement<2>,
-    ) -> Matrix4<f64> {
+    ) -> Result<Matrix4<f64>, FilterError> {
         let sensor = Aged::new(&self.sensor, measurement.age);
         let rest = Matrix4::identity() - gain * sensor.jacobian(&state.mean);
-        let noise = sensor.read(measurement).noise;
-        rest * state.covariance * rest.transpose() + gain * noise * gain.transpose()
+        let noise = sensor.read(measurement, Some(&sensor.expected(&state.mean)))?.noise;
+        Ok(rest * state.covariance * rest.transpose() + gain * noise * gain.transpose())
     }
 }
 
@@ -182,7 +183,7 @@ impl<T: Motion<4>, S: LinearSensor<4, 2>> Filter<4> for KalmanNet<T, S> {
 
     fn birth(&self, measurement: &Measurement<2>) -> Result<KalmanNetBelief, FilterError> {
         let state = self.sensor.birth(measurement, &self.motion.prior())?;
-        let history = History::new(present(&self.sensor, measurement, &state.mean));
+        let history = History::new(present(&self.sensor, measurement, &state.mean)?);
         let scratch = self.network.hyper().inputs() + self.network.scratch(1);
         Ok(KalmanNetBelief { state, history, memory: Memory::new(&self.network.initial(), scratch) })
     }
@@ -204,13 +205,13 @@ impl<T: Motion<4>, S: LinearSensor<4, 2>> Filter<4> for KalmanNet<T, S> {
         let mut next = belief.state;
         // Also refuses what is not finite before the network sees it.
         let innovation = self.classical().update(&mut next, measurement)?;
-        let reading = present(&self.sensor, measurement, &belief.state.mean);
+        let reading = present(&self.sensor, measurement, &belief.state.mean)?;
         let difference = self.sensor.difference(&reading, &self.sensor.expected(&belief.state.mean));
         let gain = self.gain(belief, &reading, &difference);
         let correction = gain * difference;
         next.mean = belief.state.mean + correction;
         if self.network.hyper().covariance == Covariance::Joseph {
-            next.covariance = self.joseph(&belief.state, &gain, measurement);
+            next.covariance = self.joseph(&belief.state, &gain, measurement)?;
         }
         next.settle()?;
         belief.state = next;
@@ -241,8 +242,12 @@ impl<T: Motion<4>, S: LinearSensor<4, 2>> Filter<4> for KalmanNet<T, S> {
         belief.memory.merge(weight, &other.memory, other_weight);
     }
 
-    fn reach(&self, belief: &KalmanNetBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.classical().reach(&belief.state)
+    fn reach(&self, belief: &KalmanNetBelief, search: &Search) -> Option<Region> {
+        self.classical().reach(&belief.state, search)
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<2>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<2>) -> Option<Vector2<f64>> {

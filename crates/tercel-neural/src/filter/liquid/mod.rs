@@ -7,7 +7,8 @@ mod network;
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, Vector2, Vector4};
+use nalgebra::{Vector2, Vector4};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Extended, Filter, Innovation};
@@ -283,8 +284,12 @@ impl<const M: usize, S: Sensor<4, M>> Filter<4> for LiquidKalman<S, M> {
         }
     }
 
-    fn reach(&self, belief: &LiquidBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.classical().reach(&belief.state)
+    fn reach(&self, belief: &LiquidBelief, search: &Search) -> Option<Region> {
+        self.classical().reach(&belief.state, search)
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<M>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {

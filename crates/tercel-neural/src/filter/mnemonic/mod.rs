@@ -5,7 +5,8 @@ mod network;
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, Vector2, Vector4};
+use nalgebra::{Vector2, Vector4};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Extended, Filter, Innovation};
@@ -211,8 +212,12 @@ impl<S: Sensor<4, 2>> Filter<4> for MnemonicKalman<S> {
         }
     }
 
-    fn reach(&self, belief: &MnemonicBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.classical().reach(&belief.state)
+    fn reach(&self, belief: &MnemonicBelief, search: &Search) -> Option<Region> {
+        self.classical().reach(&belief.state, search)
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<2>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<2>) -> Option<Vector2<f64>> {

@@ -6,7 +6,8 @@ mod outlook;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::filter::{Estimate, Extended, Filter, Imm, ImmBelief, Innovation, TurnBank};
@@ -387,8 +388,12 @@ impl<S: Sensor<4, M> + Clone, const M: usize> Filter<4> for NeuralImm<S, M> {
         Estimate { mean, covariance, modes: self.corrected(belief).collect(), extent: None }
     }
 
-    fn reach(&self, belief: &NeuralImmBelief) -> Option<(Vector2<f64>, SMatrix<f64, 2, 2>)> {
-        self.filter.reach(&belief.bank)
+    fn reach(&self, belief: &NeuralImmBelief, search: &Search) -> Option<Region> {
+        self.filter.reach(&belief.bank, search)
+    }
+
+    fn widen(&self, search: &mut Search, measurement: &Measurement<M>) {
+        search.widen(measurement);
     }
 
     fn place(&self, measurement: &Measurement<M>) -> Option<Vector2<f64>> {

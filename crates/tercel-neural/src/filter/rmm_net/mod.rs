@@ -16,6 +16,7 @@ mod view;
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Vector2};
+use tercel_core::association::{Region, Search};
 use tercel_core::belief::Gaussian;
 use tercel_core::error::FilterError;
 use tercel_core::extended::{
@@ -256,11 +257,13 @@ impl Filter<4> for RmmNet {
         Estimate { extent: belief.extent().ok().map(|extent| extent.mean()), ..belief.state.into() }
     }
 
-    fn reach(&self, belief: &RmmNetBelief) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    fn reach(&self, belief: &RmmNetBelief, search: &Search) -> Option<Region> {
         let spread = self.scattering.spread(&belief.extent().ok()?.mean());
         let covariance = belief.state.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-        Some((belief.state.mean.xy(), covariance + spread))
+        Some(search.around(belief.state.mean.xy(), &(covariance + spread)))
     }
+
+    fn widen(&self, _: &mut Search, _: &Points) {}
 
     fn place(&self, points: &Points) -> Option<Vector2<f64>> {
         (!points.is_empty()).then(|| points.mean())

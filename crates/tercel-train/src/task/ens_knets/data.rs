@@ -9,7 +9,7 @@ use rand::RngExt;
 use serde::Deserialize;
 use tercel_core::error::FilterError;
 use tercel_core::filter::Filter;
-use tercel_core::sensor::{ConvertedPolar, Measurement, Position, Sensor};
+use tercel_core::sensor::{ConvertedPolar, Measurement, Position};
 use tercel_neural::filter::{
     BranchHyper, EnsKNets, EnsKNetsBelief, EnsKNetsHyper, EnsembleNetwork, Normalisation,
 };
@@ -158,7 +158,7 @@ impl EnsembleData {
     ) -> Result<impl Fn(&Vector2<f64>) -> Measurement<2>, FilterError> {
         let (converter, deviation) = (self.converter(radar, stated)?, self.config.deviation);
         Ok(move |plot: &Vector2<f64>| {
-            let reading = Sensor::<4, 2>::read(&converter, &Measurement::from(*plot));
+            let reading = converter.convert(plot);
             let measurement = Measurement::from(reading.value);
             match deviation {
                 Some(_) => measurement,

@@ -59,7 +59,8 @@ impl Flown {
                 let state = [place.x, place.y, state[2], state[3]].map(|value| value as f32);
                 truth[4 * (step * members + member)..][..4].copy_from_slice(&state);
                 let Some(plot) = plot else { continue };
-                let read = Sensor::<4, 2>::read(sensor, plot);
+                let read = Sensor::<4, 2>::read(sensor, plot, None)
+                    .map_err(|error| TrainError::Data(format!("flight {sample}: {error}")))?;
                 let (place, reading) = (read.value - origin, &mut readings[step]);
                 reading.seen[member] = 1.0;
                 for i in 0..2 {
