@@ -37,6 +37,7 @@ impl<B: Clone> Individuals<B> {
         let mut beliefs: Vec<&mut B> = Vec::with_capacity(self.tracks.len());
         for track in &mut self.tracks {
             track.existence *= survival;
+            track.wait(dt);
             beliefs.push(&mut track.belief);
         }
         filter.predict_all(&mut beliefs, dt);

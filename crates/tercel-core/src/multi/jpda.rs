@@ -208,7 +208,11 @@ impl<B: Clone> Jpda<B> {
                         self.objects.uses[column] = Use::Updated(track.id);
                     }
                 }
-                _ if seen > 0.0 => track.miss(),
+                _ if seen > 0.0 => {
+                    let least = Management::least(track, scan.time, self.config.survival);
+                    track.existence = track.existence.max(least);
+                    track.miss();
+                }
                 _ => track.unseen(),
             }
             self.config.management.judge(track, scan.time);

@@ -4,6 +4,22 @@ use super::{Status, Track};
 
 /// The rules of a track's life.
 ///
+/// ## Which rule ends which track
+/// | rule | a tentative track | a confirmed track |
+/// |---|---|---|
+/// | `min_existence` | ends below it; under [`Confirmation::Hits`] counting alone ends it | ends below it when a measurement has just updated it: what it takes for the object does not fit |
+/// | [`Confirmation::Hits`] | ends when it can no longer reach the number | - |
+/// | `max_misses`, `max_coast` | ends beyond them | ends beyond them |
+///
+/// Misses alone never end a confirmed track before `max_misses` or `max_coast` does. If the probability of detection were
+/// constant and known, four misses in a row would leave hardly a doubt that an object is gone; but objects hide behind others
+/// and sensors have bad hours. So one object in a hundred that exists is taken to be hidden, and the existence `r` of a
+/// confirmed track at its last update, with survival `s` since, sinks no lower than
+/// ```text
+/// h r s / (h r s + 1 - r s)        h = 0.01
+/// ```
+/// Else an object that shows itself again after a long outage would be taken for clutter, or for a new one.
+///
 /// ```
 /// use tercel_core::multi::{Confirmation, Management};
 ///
@@ -14,12 +30,13 @@ use super::{Status, Track};
 pub struct Management {
     /// When a tentative track is confirmed.
     pub confirm: Confirmation,
-    /// A track with a lower probability of existence is deleted. 0 to 1.
+    /// The least probability of existence, 0 to 1: see the table above. No track starts with less, and none is confirmed.
     pub min_existence: f64,
-    /// A confirmed track with more misses in a row is deleted. Only scans that should have seen the track count.
+    /// A track with more misses in a row is deleted. Only scans that should have seen the track count.
     pub max_misses: u32,
-    /// A track that was not updated for longer is deleted, s, even if no sensor could have seen it.
-    pub max_coast: f64,
+    /// A track that was not updated for longer is deleted, s, even if no sensor could have seen it. `None` stands for 15 s, or
+    /// for the time of `max_misses` and one more scan where that is longer: slow sensors get as many chances as fast ones.
+    pub max_coast: Option<f64>,
 }
 
 /// When a tentative track is believed.
@@ -27,7 +44,8 @@ pub struct Management {
 pub enum Confirmation {
     /// When its probability of existence reaches this value, 0 to 1.
     Existence(f64),
-    /// When this many of its last scans in view updated it. A tentative track that can no longer reach the number is deleted.
+    /// When this many of its last scans in view updated it. A tentative track that can no longer reach the number is deleted,
+    /// and no sooner: it is judged by what its scans show.
     Hits {
         /// Updates needed, at least 1.
         hits: u32,
@@ -36,46 +54,75 @@ pub enum Confirmation {
     },
 }
 
+/// Share of the objects that exist which no probability of detection accounts for: they are hidden.
+const HIDDEN: f64 = 0.01;
+
+/// How long a track may coast when nothing says so and scans are frequent, s.
+const COAST: f64 = 15.0;
+
 impl Default for Management {
-    /// Confirms at an existence of 0.95; gives up below 0.02, after more than five misses in a row, or after 15 s.
+    /// Confirms at an existence of 0.95. A tentative track is given up below 0.02; any track after more than five misses in a
+    /// row, or after 15 s out of every view (six scans, where scans are more than 2.5 s apart).
     fn default() -> Self {
         Management {
             confirm: Confirmation::Existence(0.95),
             min_existence: 0.02,
             max_misses: 5,
-            max_coast: 15.0,
+            max_coast: None,
         }
     }
 }
 
 impl Management {
+    /// The least existence of a track that coasts, at `time`: objects survive a second with the probability `survival`. Zero for
+    /// a track that is not confirmed.
+    pub(super) fn least<B>(track: &Track<B>, time: f64, survival: f64) -> f64 {
+        if !track.confirmed {
+            return 0.0;
+        }
+        let alive = track.known * survival.powf(time - track.updated);
+        let hidden = HIDDEN * alive;
+        hidden / (hidden + 1.0 - alive)
+    }
+
+    /// Whether existence alone can end a track that was missed.
+    pub(super) fn ends_by_existence(&self, confirmed: bool) -> bool {
+        !confirmed && matches!(self.confirm, Confirmation::Existence(_))
+    }
+
     /// Sets the status of a track whose bookkeeping for the scan at `time` is done.
     pub(super) fn judge<B>(&self, track: &mut Track<B>, time: f64) {
-        let give_up = track.existence < self.min_existence
-            || track.misses > self.max_misses
-            || time - track.updated > self.max_coast
+        let doubtful = track.existence < self.min_existence;
+        let seen = track.measurement.is_some();
+        let coast = self.max_coast.unwrap_or_else(|| COAST.max((f64::from(self.max_misses) + 1.0) * track.pace));
+        let give_up = track.misses > self.max_misses
+            || time - track.updated > coast
+            || doubtful && (self.ends_by_existence(track.confirmed) || track.confirmed && seen)
             || track.existence.is_nan()
             || track.existence <= 0.0;
         track.status = match self.confirm {
             _ if give_up => Status::Deleted,
             _ if track.confirmed => Status::Confirmed,
             Confirmation::Existence(threshold) if track.existence >= threshold => Status::Confirmed,
-            Confirmation::Hits { hits, scans } => Self::judge_hits(track, hits, scans),
             Confirmation::Existence(_) => Status::Tentative,
+            Confirmation::Hits { hits, scans } => Self::judge_hits(track, hits, scans, doubtful),
         };
         track.confirmed |= track.status == Status::Confirmed;
+        if seen {
+            track.known = track.existence;
+        }
         if track.status == Status::Confirmed && track.misses > 0 {
             track.status = Status::Coasted;
         }
     }
 
-    fn judge_hits<B>(track: &Track<B>, hits: u32, scans: u32) -> Status {
+    fn judge_hits<B>(track: &Track<B>, hits: u32, scans: u32, doubtful: bool) -> Status {
         let window = scans.clamp(1, 64);
         let recent = (track.history & (u64::MAX >> (64 - window))).count_ones();
         let left = window.saturating_sub(track.seen);
         match () {
-            () if recent >= hits => Status::Confirmed,
-            () if recent + left < hits => Status::Deleted,
+            () if recent >= hits && !doubtful => Status::Confirmed,
+            () if recent + left < hits || doubtful && left == 0 => Status::Deleted,
             () => Status::Tentative,
         }
     }
@@ -121,12 +168,12 @@ mod tests {
         let rule = Management {
             confirm: Confirmation::Hits { hits: 1, scans: 1 },
             max_misses: 2,
-            max_coast: 100.0,
+            max_coast: Some(100.0),
             ..Default::default()
         };
         assert_eq!(life(&rule, &[false, false]).last(), Some(&Status::Coasted));
         assert_eq!(life(&rule, &[false, false, false]).last(), Some(&Status::Deleted));
-        let impatient = Management { max_coast: 1.5, max_misses: 9, ..rule };
+        let impatient = Management { max_coast: Some(1.5), max_misses: 9, ..rule };
         assert_eq!(life(&impatient, &[false, false]).last(), Some(&Status::Deleted));
     }
 }

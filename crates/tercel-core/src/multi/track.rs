@@ -29,7 +29,14 @@ pub struct Track<B> {
     /// Scans in view, at most 64.
     pub(super) seen: u32,
     pub(super) confirmed: bool,
+    /// Existence after the last scan that updated it.
+    pub(super) known: f64,
+    /// About the longest of the last times between scans, s.
+    pub(super) pace: f64,
 }
+
+/// Share of the longest time between scans that is kept from scan to scan.
+const PACE_MEMORY: f64 = 0.95;
 
 impl<B> Track<B> {
     /// A tentative track, just started by a measurement.
@@ -47,7 +54,14 @@ impl<B> Track<B> {
             history: 1,
             seen: 1,
             confirmed: false,
+            known: existence,
+            pace: 0.0,
         }
+    }
+
+    /// Lets the time between two scans pass, s. What lies 50 scans back is forgotten.
+    pub(super) fn wait(&mut self, dt: f64) {
+        self.pace = dt.max(PACE_MEMORY * self.pace);
     }
 
     /// Records that the scan at `time` updated the track.
