@@ -66,6 +66,7 @@ impl<B: Clone> Individuals<B> {
         let common = reach(last);
         let mut beliefs: Vec<&mut B> = Vec::with_capacity(self.tracks.len());
         for track in &mut self.tracks {
+            track.wait(scan.time - track.time);
             if track.time == last {
                 track.existence *= common;
                 beliefs.push(&mut track.belief);
@@ -117,7 +118,7 @@ impl<B: Clone> Individuals<B> {
         if !scan.detection.is_reports() {
             return;
         }
-        if directory.sweeps(scan.time, management.max_coast / SWEEPS) {
+        if directory.sweeps(scan.time, management.sweep()) {
             active.extend((0..tracks.len()).filter(|&row| management.is_overdue(&tracks[row], scan.time)));
         }
         active.sort_unstable();
@@ -226,6 +227,3 @@ impl<B: Clone> Individuals<B> {
         }
     }
 }
-
-/// How often silent tracks are looked for among reports, in the time after which a track is given up.
-const SWEEPS: f64 = 8.0;

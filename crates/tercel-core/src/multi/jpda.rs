@@ -207,12 +207,17 @@ impl<B: Clone> Jpda<B> {
                 // Seen means: more likely seen than not, if it is there at all.
                 Some(column) if weight > 0.0 && weight >= 0.5 * track.existence => {
                     track.hit(column, scan.time);
+                    track.reports = telling == 0.0;
                     if heaviest.0 > best_use[column] {
                         best_use[column] = heaviest.0;
                         uses[column] = Use::Updated(track.id);
                     }
                 }
-                _ if telling > 0.0 => track.miss(),
+                _ if telling > 0.0 => {
+                    let least = Management::least(track, scan.time, self.config.survival);
+                    track.existence = track.existence.max(least);
+                    track.miss();
+                }
                 _ => track.unseen(),
             }
             self.config.management.judge(track, scan.time);

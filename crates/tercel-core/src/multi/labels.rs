@@ -138,7 +138,10 @@ impl<B: Clone> Roster<B> {
         track.existence = group.weight.min(1.0);
         track.belief = group.belief(filter, terms);
         match lead.tag.measurement {
-            Some(number) if group.weight >= extract => track.hit(number, time),
+            Some(number) if group.weight >= extract => {
+                track.hit(number, time);
+                track.reports = !lead.tag.in_view;
+            }
             _ if lead.tag.in_view => track.miss(),
             _ => track.unseen(),
         }

@@ -4,6 +4,22 @@ use super::{Status, Track};
 
 /// The rules of a track's life.
 ///
+/// ## Which rule ends which track
+/// | rule | a tentative track | a confirmed track |
+/// |---|---|---|
+/// | `min_existence` | ends below it; under [`Confirmation::Hits`] counting alone ends it | ends below it when a measurement has just updated it: what it takes for the object does not fit |
+/// | [`Confirmation::Hits`] | ends when it can no longer reach the number | - |
+/// | `max_misses`, `max_coast` | ends beyond them | ends beyond them |
+///
+/// Misses alone never end a confirmed track before `max_misses` or `max_coast` does. If the probability of detection were
+/// constant and known, four misses in a row would leave hardly a doubt that an object is gone; but objects hide behind others
+/// and sensors have bad hours. So one object in a hundred that exists is taken to be hidden, and the existence `r` of a
+/// confirmed track at its last update, with survival `s` since, sinks no lower than
+/// ```text
+/// h r s / (h r s + 1 - r s)        h = 0.01
+/// ```
+/// Else an object that shows itself again after a long outage would be taken for clutter, or for a new one.
+///
 /// ```
 /// use tercel_core::multi::{Confirmation, Management};
 ///
@@ -14,13 +30,14 @@ use super::{Status, Track};
 pub struct Management {
     /// When a tentative track is confirmed.
     pub confirm: Confirmation,
-    /// A track with a lower probability of existence is deleted. 0 to 1.
+    /// The least probability of existence, 0 to 1: see the table above. No track starts with less, and none is confirmed.
     pub min_existence: f64,
-    /// A confirmed track with more misses in a row is deleted. Only scans that should have seen the track count.
+    /// A track with more misses in a row is deleted. Only scans that should have seen the track count.
     pub max_misses: u32,
-    /// A track that was not updated for longer is deleted, s, even if no sensor could have seen it; one that is updated seldom
-    /// is given four times its own interval.
-    pub max_coast: f64,
+    /// A track that was not updated for longer is deleted, s, even if no sensor could have seen it. `None` stands for 15 s, or
+    /// for the time of `max_misses` and one more scan where that is longer: slow sensors get as many chances as fast ones. An
+    /// object that reports is in any case given four times its own interval.
+    pub max_coast: Option<f64>,
 }
 
 /// When a tentative track is believed.
@@ -28,7 +45,8 @@ pub struct Management {
 pub enum Confirmation {
     /// When its probability of existence reaches this value, 0 to 1.
     Existence(f64),
-    /// When this many of its last scans in view updated it. A tentative track that can no longer reach the number is deleted.
+    /// When this many of its last scans in view updated it. A tentative track that can no longer reach the number is deleted,
+    /// and no sooner: it is judged by what its scans show.
     Hits {
         /// Updates needed, at least 1.
         hits: u32,
@@ -37,55 +55,94 @@ pub enum Confirmation {
     },
 }
 
+/// Share of the objects that exist which no probability of detection accounts for: they are hidden.
+const HIDDEN: f64 = 0.01;
+
+/// How long a track may coast when nothing says so and scans are frequent, s.
+const COAST: f64 = 15.0;
+
 impl Default for Management {
-    /// Confirms at an existence of 0.95; gives up below 0.02, after more than five misses in a row, or after 15 s.
+    /// Confirms at an existence of 0.95. A tentative track is given up below 0.02; any track after more than five misses in a
+    /// row, or after 15 s out of every view (six scans, where scans are more than 2.5 s apart).
     fn default() -> Self {
         Management {
             confirm: Confirmation::Existence(0.95),
             min_existence: 0.02,
             max_misses: 5,
-            max_coast: 15.0,
+            max_coast: None,
         }
     }
 }
 
-/// Intervals of its own for which a track may be silent.
+/// Intervals of its own for which an object that reports may be silent.
 const PATIENCE: f64 = 4.0;
 
 impl Management {
+    /// The least existence of a track that coasts, at `time`: objects survive a second with the probability `survival`. Zero for
+    /// a track that is not confirmed.
+    pub(super) fn least<B>(track: &Track<B>, time: f64, survival: f64) -> f64 {
+        if !track.confirmed {
+            return 0.0;
+        }
+        let alive = track.known * survival.powf(time - track.updated);
+        let hidden = HIDDEN * alive;
+        hidden / (hidden + 1.0 - alive)
+    }
+
+    /// Whether existence alone can end a track that was missed.
+    pub(super) fn ends_by_existence(&self, confirmed: bool) -> bool {
+        !confirmed && matches!(self.confirm, Confirmation::Existence(_))
+    }
+
     /// Sets the status of a track whose bookkeeping for the scan at `time` is done.
     pub(super) fn judge<B>(&self, track: &mut Track<B>, time: f64) {
-        let give_up = track.existence < self.min_existence
-            || track.misses > self.max_misses
+        let doubtful = track.existence < self.min_existence;
+        let seen = track.measurement.is_some();
+        let give_up = track.misses > self.max_misses
             || self.is_overdue(track, time)
+            || doubtful && (self.ends_by_existence(track.confirmed) || track.confirmed && seen)
             || track.existence.is_nan()
             || track.existence <= 0.0;
         track.status = match self.confirm {
             _ if give_up => Status::Deleted,
             _ if track.confirmed => Status::Confirmed,
             Confirmation::Existence(threshold) if track.existence >= threshold => Status::Confirmed,
-            Confirmation::Hits { hits, scans } => Self::judge_hits(track, hits, scans),
             Confirmation::Existence(_) => Status::Tentative,
+            Confirmation::Hits { hits, scans } => Self::judge_hits(track, hits, scans, doubtful),
         };
         track.confirmed |= track.status == Status::Confirmed;
+        if seen {
+            track.known = track.existence;
+        }
         if track.status == Status::Confirmed && track.misses > 0 {
             track.status = Status::Coasted;
         }
     }
 
-    /// True when a track was silent for too long: longer than `max_coast`, and than a few times its own interval, so that an
-    /// object that is seen every quarter of an hour is not given up after ten minutes.
-    pub(super) fn is_overdue<B>(&self, track: &Track<B>, time: f64) -> bool {
-        time - track.updated > self.max_coast.max(PATIENCE * track.interval)
+    /// For how long a track may be silent, s.
+    fn coast<B>(&self, track: &Track<B>) -> f64 {
+        let coast =
+            self.max_coast.unwrap_or_else(|| COAST.max((f64::from(self.max_misses) + 1.0) * track.pace));
+        if track.reports { coast.max(PATIENCE * track.interval) } else { coast }
     }
 
-    fn judge_hits<B>(track: &Track<B>, hits: u32, scans: u32) -> Status {
+    /// How often the tracks of objects that report are looked through for silent ones, s.
+    pub(super) fn sweep(&self) -> f64 {
+        self.max_coast.unwrap_or(COAST) / 8.0
+    }
+
+    /// True when a track was silent for too long.
+    pub(super) fn is_overdue<B>(&self, track: &Track<B>, time: f64) -> bool {
+        time - track.updated > self.coast(track)
+    }
+
+    fn judge_hits<B>(track: &Track<B>, hits: u32, scans: u32, doubtful: bool) -> Status {
         let window = scans.clamp(1, 64);
         let recent = (track.history & (u64::MAX >> (64 - window))).count_ones();
         let left = window.saturating_sub(track.seen);
         match () {
-            () if recent >= hits => Status::Confirmed,
-            () if recent + left < hits => Status::Deleted,
+            () if recent >= hits && !doubtful => Status::Confirmed,
+            () if recent + left < hits || doubtful && left == 0 => Status::Deleted,
             () => Status::Tentative,
         }
     }
@@ -131,12 +188,12 @@ mod tests {
         let rule = Management {
             confirm: Confirmation::Hits { hits: 1, scans: 1 },
             max_misses: 2,
-            max_coast: 100.0,
+            max_coast: Some(100.0),
             ..Default::default()
         };
         assert_eq!(life(&rule, &[false, false]).last(), Some(&Status::Coasted));
         assert_eq!(life(&rule, &[false, false, false]).last(), Some(&Status::Deleted));
-        let impatient = Management { max_coast: 1.5, max_misses: 9, ..rule };
+        let impatient = Management { max_coast: Some(1.5), max_misses: 9, ..rule };
         assert_eq!(life(&impatient, &[false, false]).last(), Some(&Status::Deleted));
     }
 }

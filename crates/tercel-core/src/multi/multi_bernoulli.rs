@@ -255,7 +255,7 @@ impl<B: Clone> MultiBernoulli<B> {
             let Some((_, label)) = pool.label else { continue };
             let existence = (pool.numerator / total).min(SUREST);
             normalise(&mut pool.beliefs);
-            let label = Label { measurement: Some(number), in_view: true, ..label };
+            let label = Label { measurement: Some(number), ..label };
             self.objects.push(Bernoulli { existence, label, beliefs: pool.beliefs });
         }
         let (prune, merge, cap) = (self.config.prune, self.config.merge, self.config.beliefs);

@@ -21,7 +21,10 @@ use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutt
 /// paired    r = r⁻ l / (1 - r⁻ + r⁻ l),        l = 1 - p_D + p_D q(z) / κ(z), and the belief is updated by z
 /// missed    r = r⁻ (1 - p_D) / (1 - r⁻ p_D)
 /// ```
-/// A measurement that no track takes starts a tentative one. A track whose belief has come as close to that of a stronger
+/// A track that stays alone is assigned once more, among what nothing explains and as if it existed for sure: the costs are then
+/// `-ln(p_D q(z) / κ(z))` and `-ln(1 - p_D)`. A track of one measurement is often less likely than clutter, at whatever it is
+/// seen next; its existence says so and rises or sinks with each scan, but it is followed. (Existence cannot be talked up by
+/// this: the expectation of `l` over clutter is at most one.) A measurement that no track takes starts a tentative one. A track whose belief has come as close to that of a stronger
 /// one as if both were one object is dropped.
 ///
 /// ## Use it when
@@ -31,7 +34,8 @@ use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutt
 ///
 /// ## Reference
 /// Blackman and Popoli (1999), section 6.4; the existence probability after Musicki, Evans and Stankovic (1994) with the
-/// assigned measurement as the only one, and the costs as in the most likely hypothesis of a multi-Bernoulli filter.
+/// assigned measurement as the only one, and the costs as in the most likely hypothesis of a multi-Bernoulli filter. The second
+/// assignment and the least existence of a track that coasts ([`Management`]) are ours.
 ///
 /// ```
 /// use tercel_core::belief::Gaussian;
@@ -154,6 +158,29 @@ impl<B: Clone> NearestNeighbour<B> {
         }
     }
 
+    /// Lets tracks that the most likely explanation of the scan leaves alone go on with what it leaves unexplained: each takes what
+    /// it most likely is *if it exists*. A doubtful track would else never be more likely than clutter, seen or not, and no
+    /// evidence for it could ever add up.
+    fn continue_doubtful(&mut self, measurements: usize) {
+        let Scratch { solver, pairs, misses, sights, columns, .. } = &mut self.scratch;
+        let mut free = vec![true; measurements];
+        columns.iter().flatten().for_each(|&column| free[column] = false);
+        let Individuals { tracks, active, .. } = &self.objects;
+        pairs.retain(|&(row, column, _)| columns[row].is_none() && free[column]);
+        if pairs.is_empty() {
+            return;
+        }
+        for (row, miss) in misses.iter_mut().enumerate() {
+            *miss = -(1.0 - sights[row].missed).max(f64::MIN_POSITIVE).ln();
+        }
+        pairs.iter_mut().for_each(|(row, _, cost)| *cost += tracks[active[*row]].existence.ln());
+        if let Ok(best) = solver.solve_sparse(pairs, measurements, misses) {
+            for (column, found) in columns.iter_mut().zip(&best.columns) {
+                *column = column.or(*found);
+            }
+        }
+    }
+
     /// Updates the paired tracks, and records the misses of the others.
     fn update<const N: usize, F>(&mut self, filter: &F, scan: &Scan<'_, F::Measurement>)
     where
@@ -176,10 +203,12 @@ impl<B: Clone> NearestNeighbour<B> {
                     let l = 1.0 - missed + seen * ratio;
                     track.existence = r * l / (1.0 - r + r * l);
                     track.hit(number, scan.time);
+                    track.reports = missed == 0.0;
                     uses[number] = Use::Updated(track.id);
                 }
                 None if missed > 0.0 => {
-                    track.existence = r * (1.0 - missed) / (1.0 - r * missed).max(f64::MIN_POSITIVE);
+                    let unseen = r * (1.0 - missed) / (1.0 - r * missed).max(f64::MIN_POSITIVE);
+                    track.existence = unseen.max(Management::least(track, scan.time, self.config.survival));
                     track.miss();
                 }
                 None => track.unseen(),
@@ -205,6 +234,7 @@ impl<B: Clone> Tracker for NearestNeighbour<B> {
         self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.objects.predict(filter, scan, self.config.survival, &self.config.management);
         self.assign(filter, scan);
+        self.continue_doubtful(scan.measurements.len());
         self.update(filter, scan);
         self.objects.drop_doubles(filter, self.config.merge);
         self.objects.birth(filter, scan, self.config.birth, &self.config.management, |_| 1.0);

@@ -32,15 +32,23 @@ pub struct Track<B> {
     pub interval: f64,
     /// What the object is called, if that is known.
     pub(super) identity: Option<Identity>,
+    /// Whether a report updated it last.
+    pub(super) reports: bool,
     /// Whether each of the last 64 scans in view updated it; the newest in the lowest bit.
     pub(super) history: u64,
     /// Scans in view, at most 64.
     pub(super) seen: u32,
     pub(super) confirmed: bool,
+    /// Existence after the last scan that updated it.
+    pub(super) known: f64,
+    /// About the longest of the last times between scans, s.
+    pub(super) pace: f64,
 }
 
 /// Share of the newest of the intervals in their mean.
 const NEWEST: f64 = 0.25;
+/// Share of the longest time between scans that is kept from scan to scan.
+const PACE_MEMORY: f64 = 0.95;
 
 impl<B> Track<B> {
     /// A tentative track, just started by a measurement.
@@ -58,10 +66,18 @@ impl<B> Track<B> {
             time,
             interval: 0.0,
             identity: None,
+            reports: false,
             history: 1,
             seen: 1,
             confirmed: false,
+            known: existence,
+            pace: 0.0,
         }
+    }
+
+    /// Lets the time between two scans pass, s. What lies 50 scans back is forgotten.
+    pub(super) fn wait(&mut self, dt: f64) {
+        self.pace = dt.max(PACE_MEMORY * self.pace);
     }
 
     /// Records that the scan at `time` updated the track.

@@ -389,7 +389,7 @@ impl ManagementConfig {
             },
             min_existence: self.min_existence.get(),
             max_misses: self.max_misses,
-            max_coast: self.max_coast.get(),
+            max_coast: Some(self.max_coast.get()),
         }
     }
 }

@@ -149,7 +149,10 @@ impl<B> Summary<B> {
             track.belief = belief;
         }
         match self.measurement {
-            Some(number) => track.hit(number, time),
+            Some(number) => {
+                track.hit(number, time);
+                track.reports = !self.in_view;
+            }
             None if self.in_view => track.miss(),
             None => track.unseen(),
         }

@@ -85,7 +85,7 @@ macro_rules! every_tracker_of_reports {
 
 /// The rules of a track of reports: ten minutes of silence end it.
 fn management(rule: Management) -> Management {
-    Management { max_coast: 600.0, max_misses: u32::MAX, min_existence: 1e-6, ..rule }
+    Management { max_coast: Some(600.0), max_misses: u32::MAX, min_existence: 1e-6, ..rule }
 }
 
 every_tracker_of_reports!(nearest_neighbour, {
