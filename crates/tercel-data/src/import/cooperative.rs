@@ -7,11 +7,9 @@ use nalgebra::Vector3;
 use tercel_core::geo::{Geodetic, LocalFrame};
 
 use super::{ImportOptions, Imported, LeftOut};
-use crate::column::wrapped;
-use crate::error::{DataError, Place};
-use crate::table::{
-    Description, Detection, Detections, Observation, Origin, Scan, SensorDescription, Truth, Truths,
-};
+use crate::error::DataError;
+use crate::geographic::{frame, middle};
+use crate::table::{Description, Detection, Detections, Observation, Scan, SensorDescription, Truth, Truths};
 
 /// One report of an object about itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +40,9 @@ pub(super) fn tables(
     file: &Arc<str>,
 ) -> Result<Imported, DataError> {
     reports.sort_by(|a, b| a.time.total_cmp(&b.time));
-    let Some(origin) = options.origin.or_else(|| middle(&reports)) else {
+    let Some(origin) =
+        options.origin.or_else(|| middle(reports.iter().map(|report| (report.latitude, report.longitude))))
+    else {
         return Ok(Imported {
             truths: options.truths.then(Truths::default),
             left_out,
@@ -94,34 +94,10 @@ pub(super) fn tables(
     })
 }
 
-fn frame(origin: Origin, file: &Arc<str>) -> Result<LocalFrame, DataError> {
-    let Origin { latitude, longitude, altitude } = origin;
-    LocalFrame::new(Geodetic { latitude, longitude, altitude }).map_err(|error| DataError::Row {
-        place: Place::whole(file),
-        problem: format!("the origin of the local frame is not on the Earth: {error}"),
-        help: "latitude and longitude of the origin are radians, the altitude is m",
-    })
-}
-
 /// Velocity in the local frame: north at the object is not quite north at the origin.
 fn velocity(frame: &LocalFrame, place: Geodetic, (speed, course): (f64, f64)) -> Option<[f64; 2]> {
     let there = LocalFrame::new(place).ok()?;
     let ecef = there.velocity_from_enu(&Vector3::new(speed * course.sin(), speed * course.cos(), 0.0));
     let enu = frame.velocity_to_enu(&ecef);
     Some([enu.x, enu.y])
-}
-
-/// The median position of the reports, on the ellipsoid.
-fn middle(reports: &[Report]) -> Option<Origin> {
-    // Longitudes near the date line are turned so that they do not fall apart.
-    let first = reports.first()?.longitude;
-    let near = |longitude: f64| first + wrapped(longitude - first);
-    let latitude = median(reports.iter().map(|report| report.latitude).collect())?;
-    let longitude = wrapped(median(reports.iter().map(|report| near(report.longitude)).collect())?);
-    Some(Origin { latitude, longitude, altitude: 0.0 })
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -73,7 +73,7 @@ impl<'a> Reports<'a> {
             return Ok(fields);
         }
         Err(DataError::MissingColumns {
-            file: Arc::clone(self.file),
+            place: Place::whole(self.file),
             missing,
             found: self.rows.header.clone(),
             help: "rename the column that holds it, or choose another source: --from".to_owned(),

@@ -148,7 +148,8 @@ pub fn import<P: AsRef<Path>>(
 }
 
 fn import_one(source: Source, path: &Path, options: &ImportOptions) -> Result<Imported, DataError> {
-    let table = |format| read_as(path, format, &options.read);
+    let read = ReadOptions { origin: options.origin.or(options.read.origin), ..options.read.clone() };
+    let table = |format| read_as(path, format, &read);
     match source {
         Source::Csv => table(Format::Csv),
         Source::Parquet => table(Format::Parquet),
