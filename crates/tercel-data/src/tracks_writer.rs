@@ -114,7 +114,7 @@ impl<'a> TracksWriter<'a> {
 
     fn begin(sink: Sink<'a>, format: Format, file: Arc<str>, head: &Tracks) -> Result<Self, DataError> {
         let columns = TrackColumns::new(head.origin, &head.labels, &head.modes);
-        let sheet = Sheet::new(columns.written());
+        let sheet = Sheet::settled(columns.written());
         let writer = SheetWriter::new(sink, format, &sheet.columns, head.metadata(), &file)?;
         let kind = Kind::Table(Box::new(Table { writer, sheet, columns }));
         let mut tracks = TracksWriter { kind, file };

@@ -36,7 +36,7 @@ fn to_sink<W: Write + Send, T: Layout>(
     file: &Arc<str>,
 ) -> Result<W, DataError> {
     let metadata = table.metadata();
-    let mut sheet = Sheet::new(T::written(&metadata));
+    let mut sheet = Sheet::settled(T::written(&metadata));
     table.fill(&mut sheet, file)?;
     let mut writer = SheetWriter::new(sink, format, &sheet.columns, metadata, file)?;
     writer.write(&sheet, file)?;

@@ -7,6 +7,7 @@ use crate::column::{Column, Kind, Limits, Written};
 use crate::earth::Navigator;
 use crate::error::{DataError, Place, Refusal};
 use crate::metadata::Metadata;
+use crate::remarks::Remarks;
 use crate::sheet::{Cells, Sheet};
 use crate::table::{Origin, Status, Track, Tracks};
 
@@ -200,6 +201,11 @@ impl Layout for Tracks {
         TrackColumns::new(metadata.origin, &metadata.labels, &metadata.modes).written()
     }
 
+    fn widest() -> Metadata {
+        let labels = COMPONENTS.iter().map(|(name, _)| (*name).to_owned()).collect();
+        Metadata { labels, ..Metadata::new(Self::TABLE, None) }
+    }
+
     /// Without a description the state is made of the components that are known by name.
     fn guess(found: &[String]) -> Metadata {
         let known = |name: &str| found.iter().any(|column| column == name);
@@ -227,10 +233,21 @@ impl Layout for Tracks {
         TrackColumns::new(self.origin, &self.labels, &self.modes).fill(sheet, &self.rows, file)
     }
 
-    fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError> {
+    fn from_sheet(
+        sheet: &Sheet,
+        metadata: Metadata,
+        context: &Context<'_>,
+        remarks: &mut Remarks,
+    ) -> Result<Self, DataError> {
         let Metadata { labels, modes, origin, .. } = metadata;
         let reader = Reader::new(sheet, &labels, &modes, context);
-        let rows = (0..sheet.len()).map(|row| reader.read(row)).collect::<Result<_, _>>()?;
+        let mut rows = Vec::with_capacity(sheet.len());
+        for row in 0..sheet.len() {
+            match reader.read(row) {
+                Ok(track) => rows.push(track),
+                Err(error) => remarks.refuse(error)?,
+            }
+        }
         Ok(Tracks { origin, labels, modes, rows })
     }
 }

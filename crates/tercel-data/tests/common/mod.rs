@@ -82,6 +82,7 @@ pub fn detections() -> impl Strategy<Value = Detections> {
     let head = (origin(), description());
     (head, vec(scan(), 0..6), any::<u32>(), 1..1000_u64).prop_map(|(head, mut scans, first, step)| {
         let (origin, description) = head;
+        scans.sort_by(|one, next| one.time.total_cmp(&next.time));
         let detections = scans.iter_mut().flat_map(|scan| &mut scan.detections);
         detections.enumerate().for_each(|(i, detection)| detection.id = u64::from(first) + i as u64 * step);
         Detections { origin, scans, description }
