@@ -6,7 +6,8 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, ImportOptions, Imported, OnError, ReadOptions, Source, import, import_from, read_truths,
+    Angles, Bearings, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import, import_from,
+    read_truths,
 };
 
 use crate::console::Console;
@@ -19,19 +20,47 @@ pub const STDIN: &str = "standard input";
 
 /// How an input file is read.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Reading")]
 pub struct ReadArguments {
     /// What the input is; without it, its name and its first line tell.
     #[arg(long, value_name = "FORMAT", value_parser = source_parser())]
     pub from: Option<Source>,
-    /// Unit of bearings in a detection table.
+    /// Unit of bearings in a detection table, where their column does not name it.
     #[arg(long, value_enum, default_value_t, value_name = "UNIT")]
     pub angles: AngleUnit,
+    /// From where bearings run; without it, the name of their column tells.
+    #[arg(long, value_enum, value_name = "WAY")]
+    pub bearings: Option<BearingWay>,
+    /// Units of columns, by their names or by length and speed: range=nm,z=ft,speed=kn.
+    #[arg(long, value_name = "COLUMN=UNIT", value_delimiter = ',', value_parser = unit)]
+    pub units: Vec<(String, Unit)>,
+    /// Which column of the file holds one of the table: x=east_m. May be given several times.
+    #[arg(long, value_name = "COLUMN=NAME", value_parser = pair)]
+    pub column: Vec<(String, String)>,
+    /// A column of the file that is not looked at. May be given several times.
+    #[arg(long, value_name = "NAME")]
+    pub ignore: Vec<String>,
     /// Names of the columns of a CSV file that has no header, in their order: time,x,y.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
     /// Name of the sensor, for a detection table that does not name one.
     #[arg(long, value_name = "NAME")]
     pub sensor: Option<String>,
+    /// Key of the list of detections in JSON.
+    #[arg(long, value_name = "KEY")]
+    pub list: Option<String>,
+    /// Unit of times that are numbers; without it, their size and spacing tell.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub time_unit: Option<TimeUnit>,
+    /// Zone of dates without one: UTC, +02:00, Europe/Oslo. Without it, UTC.
+    #[arg(long, value_name = "ZONE", allow_hyphen_values = true)]
+    pub time_zone: Option<String>,
+    /// What stands first in dates such as 05/03/2024.
+    #[arg(long, value_enum, value_name = "ORDER")]
+    pub date_order: Option<DateOrder>,
+    /// Leave out rows that repeat another row of their scan.
+    #[arg(long)]
+    pub drop_repeated: bool,
     /// Keep base stations, aids to navigation and aircraft among the ships (ais, nmea).
     #[arg(long)]
     pub all_stations: bool,
@@ -42,9 +71,56 @@ pub struct ReadArguments {
 pub enum AngleUnit {
     /// Bearings in degrees.
     Degrees,
-    /// Bearings in radians, from -pi to pi.
+    /// Bearings in radians.
     #[default]
     Radians,
+}
+
+/// From where and which way round bearings run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum BearingWay {
+    /// From east (x) towards north (y).
+    Math,
+    /// Clockwise from north.
+    Compass,
+}
+
+/// A unit of times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum TimeUnit {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+    /// Minutes.
+    Min,
+    /// Days, as spreadsheets count them.
+    Days,
+}
+
+/// What stands first in a date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum DateOrder {
+    /// 05/03/2024 is 5 March.
+    DayFirst,
+    /// 05/03/2024 is 3 May.
+    MonthFirst,
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((column, name)) if !column.is_empty() && !name.is_empty() => Ok((column.trim().to_owned(), name.to_owned())),
+        _ => Err("expected COLUMN=NAME, such as x=east_m".to_owned()),
+    }
+}
+
+fn unit(text: &str) -> Result<(String, Unit), String> {
+    let (column, unit) = text.split_once('=').ok_or("expected COLUMN=UNIT, such as range=nm")?;
+    Ok((column.trim().to_owned(), unit.parse()?))
 }
 
 fn source_parser() -> impl TypedValueParser<Value = Source> {
@@ -55,11 +131,38 @@ fn source_parser() -> impl TypedValueParser<Value = Source> {
 impl ReadArguments {
     /// The options of the reader.
     pub fn options(&self) -> ReadOptions {
-        let angles = match self.angles {
-            AngleUnit::Degrees => Angles::Degrees,
-            AngleUnit::Radians => Angles::Radians,
-        };
-        ReadOptions { angles, sensor: self.sensor.as_deref().map(Into::into), columns: self.columns.clone(), on_error: OnError::Fail }
+        ReadOptions {
+            angles: match self.angles {
+                AngleUnit::Degrees => Angles::Degrees,
+                AngleUnit::Radians => Angles::Radians,
+            },
+            bearings: self.bearings.map(|way| match way {
+                BearingWay::Math => Bearings::Math,
+                BearingWay::Compass => Bearings::Compass,
+            }),
+            units: self.units.clone(),
+            renames: self.column.clone(),
+            ignore: self.ignore.clone(),
+            columns: self.columns.clone(),
+            sensor: self.sensor.as_deref().map(Into::into),
+            list: self.list.clone(),
+            time_unit: self.time_unit.map(|unit| match unit {
+                TimeUnit::S => Unit::Second,
+                TimeUnit::Ms => Unit::Millisecond,
+                TimeUnit::Us => Unit::Microsecond,
+                TimeUnit::Ns => Unit::Nanosecond,
+                TimeUnit::Min => Unit::Minute,
+                TimeUnit::Days => Unit::Day,
+            }),
+            time_zone: self.time_zone.clone(),
+            date_order: self.date_order.map(|order| match order {
+                DateOrder::DayFirst => tercel_data::DateOrder::DayFirst,
+                DateOrder::MonthFirst => tercel_data::DateOrder::MonthFirst,
+            }),
+            on_error: OnError::Fail,
+            drop_repeated: self.drop_repeated,
+            origin: None,
+        }
     }
 
     /// The source of a file: the one that was named, or the one that it looks like.

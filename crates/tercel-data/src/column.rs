@@ -1,7 +1,7 @@
 //! What a column of a table holds, and which values it takes.
 
 use std::borrow::Cow;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::error::Refusal;
 
@@ -95,21 +95,51 @@ impl Column {
         match self.kind {
             Kind::Text => "a name",
             Kind::Count => "a whole number from 0",
-            Kind::Time => "a time in seconds, or a date and time with an offset (RFC 3339)",
+            Kind::Time => "a time in seconds, or a date and time such as 2024-03-05T10:00:00Z",
             Kind::Real(limits) => limits.expected(),
         }
     }
 
-    /// The number from a file with such angles, in the unit of the column.
-    pub fn real_from(&self, value: f64, angles: Angles) -> Result<f64, Refusal> {
+    /// The number from a file, in the unit of the column.
+    pub fn real_from(&self, value: f64, conversion: Conversion) -> Result<f64, Refusal> {
         let Kind::Real(limits) = self.kind else {
             return Limits::Finite.check(value);
         };
-        if self.unit_in(angles) != "deg" {
-            return limits.check(value);
+        if limits != Limits::Angle {
+            return limits.check(value * conversion.factor);
         }
-        let angle = Limits::Finite.check(value)?.to_radians();
-        limits.check(if limits == Limits::Angle { wrapped(angle) } else { angle })
+        let angle = conversion.turned(Limits::Finite.check(value)? * conversion.factor);
+        // More than a turn in radians is a sign of degrees.
+        let plain = !conversion.compass && conversion.factor == 1.0;
+        let fits = !plain || angle.abs() <= 2.0 * PI;
+        limits.check(if fits { wrapped(angle) } else { angle })
+    }
+
+    /// Refuses a number that no reader would take.
+    pub fn check(&self, value: f64) -> Result<(), Refusal> {
+        match self.kind {
+            Kind::Real(limits) => limits.check(value).map(|_| ()),
+            _ => Limits::Finite.check(value).map(|_| ()),
+        }
+    }
+}
+
+/// How the numbers of a column of a file become those of the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Conversion {
+    /// SI units in the unit of the file.
+    pub factor: f64,
+    /// Bearings run clockwise from north.
+    pub compass: bool,
+    /// The file is one of another program, which may say in words that a cell is empty.
+    pub foreign: bool,
+}
+
+impl Conversion {
+    pub const NONE: Conversion = Conversion { factor: 1.0, compass: false, foreign: false };
+
+    fn turned(self, angle: f64) -> f64 {
+        if self.compass { FRAC_PI_2 - angle } else { angle }
     }
 }
 
@@ -157,6 +187,9 @@ impl Limits {
 
 /// The same angle in [-π, π].
 pub(crate) fn wrapped(angle: f64) -> f64 {
+    if (-PI..=PI).contains(&angle) {
+        return angle;
+    }
     let turned = angle.rem_euclid(2.0 * PI);
     if turned > PI { turned - 2.0 * PI } else { turned }
 }
@@ -166,29 +199,42 @@ mod tests {
     use super::*;
 
     const BEARING: Column = Column::real("bearing", "rad", Limits::Angle);
+    const DEGREES: Conversion = Conversion { factor: PI / 180.0, ..Conversion::NONE };
 
     #[test]
     fn degrees_of_any_turn_become_radians_within_half_a_turn() {
         for (degrees, radians) in
             [(0.0, 0.0), (180.0, PI), (271.4, -1.546_362), (-190.0, 2.967_060), (725.0, 0.087_266)]
         {
-            let bearing = BEARING.real_from(degrees, Angles::Degrees).unwrap();
+            let bearing = BEARING.real_from(degrees, DEGREES).unwrap();
             assert!((bearing - radians).abs() < 1e-5, "{degrees} deg gave {bearing}");
         }
     }
 
     #[test]
+    fn compass_bearings_turn_the_other_way_from_north() {
+        let compass = Conversion { compass: true, ..DEGREES };
+        for (degrees, radians) in
+            [(0.0, FRAC_PI_2), (90.0, 0.0), (180.0, -FRAC_PI_2), (270.0, PI), (300.0, 5.0 * PI / 6.0)]
+        {
+            let bearing = BEARING.real_from(degrees, compass).unwrap();
+            assert!(wrapped(bearing - radians).abs() < 1e-12, "{degrees} deg gave {bearing}");
+        }
+    }
+
+    #[test]
     fn a_bearing_in_degrees_read_as_radians_is_refused_with_the_fix() {
-        let refusal = BEARING.real_from(271.4, Angles::Radians).unwrap_err();
+        let refusal = BEARING.real_from(271.4, Conversion::NONE).unwrap_err();
         assert!(refusal.help.unwrap().contains("--angles degrees"));
+        assert!((BEARING.real_from(6.0, Conversion::NONE).unwrap() - (6.0 - 2.0 * PI)).abs() < 1e-15);
     }
 
     #[test]
     fn a_deviation_must_be_positive_and_finite() {
         let sigma = Column::real("sigma_x", "m", Limits::Positive);
-        assert!(sigma.real_from(1e-300, Angles::Radians).is_ok());
+        assert!(sigma.real_from(1e-300, Conversion::NONE).is_ok());
         for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(sigma.real_from(value, Angles::Radians).is_err());
+            assert!(sigma.real_from(value, Conversion::NONE).is_err());
         }
     }
 }

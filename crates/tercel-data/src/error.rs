@@ -84,10 +84,10 @@ pub enum DataError {
         known: &'static str,
     },
     /// Columns that are needed are not there.
-    #[error("{file}: no column {}; the columns are {}", quoted(missing), quoted(found))]
+    #[error("{place}: no column {}; the columns are {}", quoted(missing), quoted(found))]
     MissingColumns {
-        /// The file.
-        file: Arc<str>,
+        /// Where: the file, or a line of a stream.
+        place: Place,
         /// The columns that are needed and missing.
         missing: Vec<String>,
         /// The columns that are there.
@@ -173,6 +173,22 @@ impl DataError {
             DataError::Value { help, .. } => help.as_deref(),
         }
         .filter(|help| !help.is_empty())
+    }
+
+    /// Why a single row cannot be used, without its place; nothing when the error is one of the whole file.
+    pub(crate) fn reason(&self) -> Option<String> {
+        match self {
+            DataError::Value { column, value, .. } if value.as_ref() == "empty" => {
+                Some(format!("`{column}` is empty"))
+            }
+            DataError::Value { column, expected, .. } => Some(format!("`{column}` is not {expected}")),
+            DataError::Row { problem, .. } => Some(problem.clone()),
+            DataError::Corrupt { place, problem, .. } if matches!(place.spot, Spot::Line(_)) => {
+                Some(problem.split(": ").next().unwrap_or_default().to_owned())
+            }
+            DataError::Unsettled { place, problem, .. } if place.spot != Spot::Whole => Some(problem.clone()),
+            _ => None,
+        }
     }
 
     /// True when the operating system refused, as opposed to content that is wrong.

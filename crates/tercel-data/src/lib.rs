@@ -26,9 +26,11 @@
 mod column;
 mod error;
 mod format;
+mod geographic;
 pub mod import;
 mod layout;
 mod metadata;
+mod names;
 pub mod ndjson;
 mod npy;
 mod options;
@@ -38,20 +40,23 @@ mod remarks;
 mod sheet;
 mod source;
 pub mod table;
+mod time;
+mod unit;
 mod write;
 
 pub use column::Angles;
 pub use error::{DataError, Place, Spot};
 pub use format::Format;
-pub use import::{DateOrder, ImportOptions, Imported, LeftOut, Recording, Source, import, import_from};
+pub use import::{ImportOptions, Imported, LeftOut, Recording, Source, import, import_from};
 pub use metadata::SCHEMA_VERSION;
 pub use npy::{Array, read_npy, read_npy_from};
-pub use options::{OnError, ReadOptions};
+pub use options::{Bearings, DateOrder, OnError, ReadOptions};
 pub use output::AtomicFile;
 pub use read::{
     read_detections, read_detections_from, read_metrics, read_metrics_from, read_tracks, read_tracks_from,
     read_truths, read_truths_from,
 };
+pub use unit::Unit;
 pub use write::{
     TracksWriter, write_detections, write_detections_to, write_metrics, write_metrics_to, write_tracks,
     write_tracks_to, write_truths, write_truths_to,

@@ -25,26 +25,24 @@
 //! Detections without a number (`detection`) are numbered in the order of the stream, above every number before.
 //! A number that is there twice is an error within a scan; a stream is too long to remember all of them.
 
-use std::collections::HashSet;
+use std::collections::VecDeque;
 use std::io::{BufRead, Write};
 use std::sync::Arc;
 
 use serde_json::{Map, Value};
+use tercel_core::geo::LocalFrame;
 
 use crate::error::{DataError, Place};
-use crate::format::json::{Lines, description, push_with, write_row};
-use crate::layout::{
-    Context, DetectionRow, Layout, Rows, detection_columns, fill_tracks, near_miss, track_columns,
-};
+use crate::format::json::{Keys, Lines, description, write_row};
+use crate::geographic::{frame, on_earth};
+use crate::layout::{Context, DetectionRow, Layout, Rows, detection_columns, fill_tracks, track_columns};
 use crate::metadata::Metadata;
+use crate::names::Naming;
 use crate::options::ReadOptions;
+use crate::remarks::Remarks;
 use crate::sheet::Sheet;
 use crate::table::{Description, Detections, Origin, Scan, Track};
-
-/// Key of the list in a line that is a whole scan.
-const LIST: &str = "detections";
-/// What a whole scan says once for all of its detections.
-const SHARED: [&str; 6] = ["time", "sensor", "scan", "sensor_x", "sensor_y", "sensor_z"];
+use crate::time::Clock;
 
 /// Reads scans from a stream of lines.
 ///
@@ -71,35 +69,41 @@ const SHARED: [&str; 6] = ["time", "sensor", "scan", "sensor_x", "sensor_y", "se
 pub struct Scans<R> {
     lines: Lines<R>,
     options: ReadOptions,
+    keys: Keys,
     sheet: Sheet,
+    /// Made with the first line, whose key of the time may name a unit.
+    clock: Option<Clock>,
     origin: Option<Origin>,
+    frame: Option<LocalFrame>,
     description: Description,
     next_id: u64,
-    /// Keys that are no columns and look like none.
-    strangers: HashSet<String>,
     /// The scan whose lines may go on, with its number in the file.
     open: Option<(Scan, Option<u64>)>,
-    /// A whole scan that waits for the one before it to be handed out.
-    waiting: Option<Scan>,
+    /// Scans that are complete, and wait to be handed out one by one.
+    complete: VecDeque<Scan>,
 }
 
 impl<R: BufRead> Scans<R> {
     /// Reads from `reader`; `name` stands for it in messages.
     pub fn new(reader: R, name: &str, options: ReadOptions) -> Self {
+        let naming = naming(false, &options);
         Scans {
             lines: Lines::new(reader, name.into()),
-            sheet: Sheet::new(options.relaxed(detection_columns())),
+            sheet: Sheet::new(naming.columns().to_vec()),
+            keys: Keys::new(naming, true, &options),
+            clock: None,
+            origin: options.origin,
+            frame: None,
             options,
-            origin: None,
             description: Description::default(),
             next_id: 0,
-            strangers: HashSet::new(),
             open: None,
-            waiting: None,
+            complete: VecDeque::new(),
         }
     }
 
-    /// Where the local frame lies, once a line has said so.
+    /// Where the local frame lies, once a line has said so. Without that, positions in latitude and longitude lie around the
+    /// first of them.
     pub fn origin(&self) -> Option<Origin> {
         self.origin
     }
@@ -109,133 +113,114 @@ impl<R: BufRead> Scans<R> {
         self.description.clone()
     }
 
-    /// Takes in a line; a scan that it completes is handed out.
-    fn take(&mut self, object: &Map<String, Value>, line: u64) -> Result<Option<Scan>, DataError> {
+    /// What was decided so far and the user should know, in sentences.
+    pub fn notes(&self) -> Vec<String> {
+        self.keys.notes().into_iter().chain(self.clock.as_ref().and_then(Clock::note)).collect()
+    }
+
+    /// Takes in a line; the scans that it completes are then there.
+    fn take(&mut self, object: &Map<String, Value>, place: &Place) -> Result<(), DataError> {
         if let Some(json) = description(object) {
-            return self.describe(&json).map(|()| None);
+            return self.describe(&json);
         }
-        match object.get(LIST) {
-            None => {
-                self.check_keys(object, line)?;
-                let numbered = self.next_id;
-                let row = self.row(object, object, line)?;
-                self.take_row(row, numbered, line)
-            }
-            Some(Value::Array(list)) => {
-                self.check_keys(object, line)?;
-                let scan = self.whole(object, list, line)?;
-                match self.open.take() {
-                    Some((before, _)) => {
-                        self.waiting = Some(scan);
-                        Ok(Some(before))
-                    }
-                    None => Ok(Some(scan)),
-                }
-            }
-            Some(_) => {
-                Err(self.wrong(line, "`detections` is no list", "give a list of objects, possibly empty"))
-            }
+        self.sheet = Sheet::new(std::mem::take(&mut self.sheet.columns));
+        let taken = self.keys.take(object, place, &mut self.sheet)?;
+        let mut numbered = self.next_id;
+        let rows = self.rows()?;
+        if !taken.whole {
+            return rows.into_iter().try_for_each(|row| self.take_row(row, numbered, place));
         }
-    }
-
-    fn describe(&mut self, json: &str) -> Result<(), DataError> {
-        let metadata = Metadata::parse(json, Detections::TABLE, self.lines.file())?;
-        metadata.check_units(&self.sheet.columns, self.options.angles, self.lines.file())?;
-        self.origin = metadata.origin;
-        self.description = metadata.description;
-        Ok(())
-    }
-
-    fn wrong(&self, line: u64, problem: &str, help: &'static str) -> DataError {
-        DataError::Row { place: Place::line(self.lines.file(), line), problem: problem.to_owned(), help }
-    }
-
-    /// Refuses keys that are almost columns: without them a line may look like an empty scan.
-    fn check_keys(&mut self, object: &Map<String, Value>, line: u64) -> Result<(), DataError> {
-        /// A stream with more strange keys than this is not worth remembering.
-        const REMEMBERED: usize = 256;
-        for key in object.keys() {
-            if key == LIST || self.sheet.position(key).is_some() || self.strangers.contains(key) {
-                continue;
-            }
-            if let Some(error) = near_miss(key, &self.sheet.columns, || Place::line(self.lines.file(), line))
-            {
-                return Err(error);
-            }
-            if self.strangers.len() < REMEMBERED {
-                self.strangers.insert(key.clone());
-            }
-        }
-        Ok(())
-    }
-
-    /// Reads a detection whose shared columns stand in `scan`.
-    fn row(
-        &mut self,
-        detection: &Map<String, Value>,
-        scan: &Map<String, Value>,
-        line: u64,
-    ) -> Result<DetectionRow, DataError> {
-        let Scans { sheet, options, lines, .. } = self;
-        sheet.clear();
-        sheet.lines.push(line);
-        let find =
-            |name: &str| detection.get(name).or_else(|| scan.get(name).filter(|_| SHARED.contains(&name)));
-        push_with(sheet, find, options.angles)
-            .map_err(|(column, refusal)| refusal.at(Place::line(lines.file(), line), &column))?;
-        let context = Context { file: lines.file(), options, found: &[] };
-        let row = Rows::of_line(sheet, &context).read(0, self.next_id)?;
-        if let Some(detection) = &row.detection {
-            self.next_id = self.next_id.max(detection.id.saturating_add(1));
-        }
-        Ok(row)
-    }
-
-    fn take_row(&mut self, row: DetectionRow, numbered: u64, line: u64) -> Result<Option<Scan>, DataError> {
-        let place = Place::line(self.lines.file(), line);
-        match &mut self.open {
-            Some((scan, number)) if row.continues(scan, *number) => {
-                no_repetition(scan, &row, numbered, &place)?;
-                row.join(scan, || place).map(|()| None)
-            }
-            _ => {
-                let number = row.scan;
-                Ok(self.open.replace((row.start(), number)).map(|(before, _)| before))
-            }
-        }
-    }
-
-    /// Reads a line that is a whole scan.
-    fn whole(&mut self, object: &Map<String, Value>, list: &[Value], line: u64) -> Result<Scan, DataError> {
-        let place = Place::line(self.lines.file(), line);
         let mut scan: Option<Scan> = None;
-        for element in list {
-            let Value::Object(detection) = element else {
-                return Err(self.wrong(
-                    line,
-                    "`detections` holds what is no object",
-                    "give a list of objects",
-                ));
-            };
-            self.check_keys(detection, line)?;
-            let numbered = self.next_id;
-            let row = self.row(detection, object, line)?;
-            if row.detection.is_none() {
-                return Err(self.wrong(line, "a detection has no measurement", "give x and y, or a bearing"));
-            }
+        for row in rows {
+            let next = row.detection.as_ref().map_or(0, |detection| detection.id.saturating_add(1));
             match &mut scan {
                 Some(scan) => {
-                    no_repetition(scan, &row, numbered, &place)?;
+                    no_repetition(scan, &row, numbered, place)?;
                     row.join(scan, || place.clone())?;
                 }
                 None => scan = Some(row.start()),
             }
+            numbered = numbered.max(next);
         }
-        match scan {
-            Some(scan) => Ok(scan),
-            None => Ok(self.row(&Map::new(), object, line)?.start()),
+        self.complete.extend(self.open.take().map(|(before, _)| before));
+        self.complete.extend(scan);
+        Ok(())
+    }
+
+    fn describe(&mut self, json: &str) -> Result<(), DataError> {
+        let file = self.lines.file();
+        let metadata = Metadata::parse(json, Detections::TABLE, file)?;
+        metadata.check_units(&detection_columns(), self.options.angles, file)?;
+        self.origin = metadata.origin;
+        self.description = metadata.description;
+        let naming = naming(true, &self.options);
+        self.sheet = Sheet::new(naming.columns().to_vec());
+        self.keys.describe(naming);
+        self.clock = None;
+        Ok(())
+    }
+
+    /// The rows of the line that was taken in.
+    fn rows(&mut self) -> Result<Vec<DetectionRow>, DataError> {
+        let file = Arc::clone(self.lines.file());
+        let clock = match &mut self.clock {
+            Some(clock) => clock,
+            None => self.clock.insert(Clock::new(&self.options, self.keys.time_unit(), &file)?),
+        };
+        self.sheet.settle_times(clock, &file, &mut Remarks::default())?;
+        self.find_frame(&file)?;
+        let context = Context { file: &file, options: &self.options, found: &[], ours: false, keyed: true };
+        let reader = Rows::new(&self.sheet, &context, self.frame.as_ref());
+        let mut next = self.next_id;
+        let mut rows = Vec::with_capacity(self.sheet.len());
+        for row in 0..self.sheet.len() {
+            let row = reader.read(row, next)?;
+            if let Some(detection) = &row.detection {
+                next = next.max(detection.id.saturating_add(1));
+            }
+            rows.push(row);
+        }
+        self.next_id = next;
+        Ok(rows)
+    }
+
+    /// Lays the local frame at the first position in latitude and longitude, unless it is known where it lies.
+    fn find_frame(&mut self, file: &Arc<str>) -> Result<(), DataError> {
+        if self.frame.is_some() {
+            return Ok(());
+        }
+        let [latitude, longitude] = ["latitude", "longitude"].map(|name| self.sheet.reals(name));
+        let first =
+            (0..self.sheet.len()).find_map(|row| on_earth(latitude.get(row)?, longitude.get(row)?).ok());
+        if let Some((latitude, longitude)) = first {
+            let origin = *self.origin.get_or_insert(Origin { latitude, longitude, altitude: 0.0 });
+            self.frame = Some(frame(origin, file)?);
+        }
+        Ok(())
+    }
+
+    fn take_row(&mut self, row: DetectionRow, numbered: u64, place: &Place) -> Result<(), DataError> {
+        match &mut self.open {
+            Some((scan, number)) if row.continues(scan, *number) => {
+                no_repetition(scan, &row, numbered, place)?;
+                row.join(scan, || place.clone())
+            }
+            _ => {
+                let number = row.scan;
+                self.complete.extend(self.open.replace((row.start(), number)).map(|(before, _)| before));
+                Ok(())
+            }
         }
     }
+}
+
+/// The keys of a stream, which is one of ours or not.
+fn naming(ours: bool, options: &ReadOptions) -> Naming {
+    let mut columns = options.relaxed(detection_columns());
+    if !ours {
+        columns.extend(Detections::foreign_columns());
+    }
+    Naming::new(Detections::TABLE, ours, columns, options)
 }
 
 /// Refuses a detection number that the scan has already. Numbers from `numbered` on were not there before.
@@ -255,17 +240,17 @@ impl<R: BufRead> Iterator for Scans<R> {
     type Item = Result<Scan, DataError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if let Some(scan) = self.waiting.take() {
-            return Some(Ok(scan));
-        }
         loop {
+            if let Some(scan) = self.complete.pop_front() {
+                return Some(Ok(scan));
+            }
             let taken = match self.lines.next() {
                 None => return self.open.take().map(|(scan, _)| Ok(scan)),
-                Some(Ok((object, line))) => self.take(&object, line),
+                Some(Ok((object, place))) => self.take(&object, &place),
                 Some(Err(error)) => Err(error),
             };
-            if let Some(item) = taken.transpose() {
-                return Some(item);
+            if let Err(error) = taken {
+                return Some(Err(error));
             }
         }
     }
@@ -308,7 +293,7 @@ pub fn write_track(
     modes: &[String],
 ) -> Result<(), DataError> {
     let file: Arc<str> = "the stream of tracks".into();
-    let mut sheet = Sheet::new(track_columns(labels, modes));
+    let mut sheet = Sheet::settled(track_columns(labels, modes));
     fill_tracks(&mut sheet, std::slice::from_ref(track), labels, modes, &file)?;
     if let Some((_, column, refusal)) = sheet.first_refused() {
         return Err(refusal.at(Place::whole(&file), &column.name));

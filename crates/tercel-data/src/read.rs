@@ -1,6 +1,6 @@
 //! Reading tables, by the name of a file or from a stream.
 
-use std::io::Read;
+use std::io::{BufRead, Read};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -16,18 +16,16 @@ use crate::table::{Detections, Metrics, Tracks, Truths};
 fn from_path<T: Layout>(path: &Path, options: &ReadOptions) -> Result<T, DataError> {
     let format = Format::of_input(path).map_or_else(|| Format::of(path), Ok)?;
     let (file, mut reader) = open(path)?;
-    read_table(reader.as_mut(), format, &file, options, &mut Remarks::default())
+    read_table(reader.as_mut(), format, &file, options, &mut Remarks::new(options.on_error))
 }
 
 /// Reads detections in a format that was chosen by hand.
 pub(crate) fn read_as(path: &Path, format: Format, options: &ReadOptions) -> Result<Imported, DataError> {
     let (file, mut reader) = open(path)?;
-    let mut remarks = Remarks::default();
-    let detections = read_table(reader.as_mut(), format, &file, options, &mut remarks)?;
-    Ok(Imported { detections, notes: remarks.notes, left_out: remarks.left_out, truths: None })
+    imported(reader.as_mut(), format, &file, options)
 }
 
-/// Reads detections from a stream, with what is worth saying of them.
+/// Reads detections from a stream, with what was decided and left out on the way; `name` stands for it in messages.
 pub(crate) fn read_stream_as(
     reader: impl Read,
     format: Format,
@@ -36,8 +34,17 @@ pub(crate) fn read_stream_as(
 ) -> Result<Imported, DataError> {
     let file: Arc<str> = name.into();
     let mut reader = decompressed(reader, &file)?;
-    let mut remarks = Remarks::default();
-    let detections = read_table(reader.as_mut(), format, &file, options, &mut remarks)?;
+    imported(reader.as_mut(), format, &file, options)
+}
+
+fn imported(
+    reader: &mut dyn BufRead,
+    format: Format,
+    file: &Arc<str>,
+    options: &ReadOptions,
+) -> Result<Imported, DataError> {
+    let mut remarks = Remarks::new(options.on_error);
+    let detections = read_table(reader, format, file, options, &mut remarks)?;
     Ok(Imported { detections, notes: remarks.notes, left_out: remarks.left_out, truths: None })
 }
 
@@ -49,7 +56,7 @@ fn from_stream<T: Layout>(
 ) -> Result<T, DataError> {
     let file: Arc<str> = name.into();
     let mut reader = decompressed(reader, &file)?;
-    read_table(reader.as_mut(), format, &file, options, &mut Remarks::default())
+    read_table(reader.as_mut(), format, &file, options, &mut Remarks::new(options.on_error))
 }
 
 /// Reads detections from a CSV, Parquet or NDJSON file, compressed by gzip or not.

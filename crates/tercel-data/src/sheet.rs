@@ -2,16 +2,18 @@
 
 use std::sync::Arc;
 
-use crate::column::{Angles, Column, Kind};
-use crate::error::{Place, Refusal, Spot};
+use crate::column::{Column, Conversion, Kind};
+use crate::error::{DataError, Place, Refusal, Spot};
+use crate::remarks::Remarks;
+use crate::time::{Clock, Moment, Times};
 
 /// Columns of equal length, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sheet {
     pub columns: Vec<Column>,
     pub values: Vec<Values>,
-    /// The line on which each row stood, for text formats.
-    pub lines: Vec<u64>,
+    /// Where each row stood in the file.
+    pub spots: Vec<Spot>,
 }
 
 /// The cells of one column.
@@ -20,6 +22,8 @@ pub(crate) enum Values {
     Real(Vec<Option<f64>>),
     Count(Vec<Option<u64>>),
     Text(Vec<Option<Arc<str>>>),
+    /// Times whose unit and zone are not settled yet.
+    Time(Vec<Option<Moment>>),
 }
 
 impl Values {
@@ -27,7 +31,8 @@ impl Values {
         match kind {
             Kind::Text => Values::Text(Vec::new()),
             Kind::Count => Values::Count(Vec::new()),
-            Kind::Time | Kind::Real(_) => Values::Real(Vec::new()),
+            Kind::Time => Values::Time(Vec::new()),
+            Kind::Real(_) => Values::Real(Vec::new()),
         }
     }
 
@@ -36,6 +41,7 @@ impl Values {
             Values::Real(cells) => cells.len(),
             Values::Count(cells) => cells.len(),
             Values::Text(cells) => cells.len(),
+            Values::Time(cells) => cells.len(),
         }
     }
 
@@ -44,6 +50,30 @@ impl Values {
             Values::Real(cells) => cells.clear(),
             Values::Count(cells) => cells.clear(),
             Values::Text(cells) => cells.clear(),
+            Values::Time(cells) => cells.clear(),
+        }
+    }
+
+    fn truncate(&mut self, len: usize) {
+        match self {
+            Values::Real(cells) => cells.truncate(len),
+            Values::Count(cells) => cells.truncate(len),
+            Values::Text(cells) => cells.truncate(len),
+            Values::Time(cells) => cells.truncate(len),
+        }
+    }
+
+    /// Keeps the cells of the rows that are wanted.
+    fn retain(&mut self, wanted: &[bool]) {
+        fn kept<T>(cells: &mut Vec<T>, wanted: &[bool]) {
+            let mut wanted = wanted.iter();
+            cells.retain(|_| wanted.next().copied().unwrap_or(true));
+        }
+        match self {
+            Values::Real(cells) => kept(cells, wanted),
+            Values::Count(cells) => kept(cells, wanted),
+            Values::Text(cells) => kept(cells, wanted),
+            Values::Time(cells) => kept(cells, wanted),
         }
     }
 
@@ -52,6 +82,7 @@ impl Values {
             Values::Real(cells) => cells[row].is_none(),
             Values::Count(cells) => cells[row].is_none(),
             Values::Text(cells) => cells[row].is_none(),
+            Values::Time(cells) => cells[row].is_none(),
         }
     }
 
@@ -63,42 +94,64 @@ impl Values {
             Values::Real(cells) => cells.push(None),
             Values::Count(cells) => cells.push(None),
             Values::Text(cells) => cells.push(None),
+            Values::Time(cells) => cells.push(None),
         }
         Ok(())
     }
 
     /// Adds a number that came as one.
-    pub fn push_number(&mut self, number: f64, column: &Column, angles: Angles) -> Result<(), Refusal> {
+    pub fn push_number(
+        &mut self,
+        number: f64,
+        column: &Column,
+        conversion: Conversion,
+    ) -> Result<(), Refusal> {
+        // Programs that know no empty number write "not a number".
+        if number.is_nan() && conversion.foreign {
+            return self.push_null(column);
+        }
         match self {
-            Values::Real(cells) => cells.push(Some(column.real_from(number, angles)?)),
+            Values::Real(cells) => cells.push(Some(column.real_from(number, conversion)?)),
             Values::Count(cells) => cells.push(Some(whole(number, column)?)),
-            Values::Text(_) => return Err(Refusal::new(number, column.expected())),
+            Values::Time(cells) => cells.push(Some(Moment::Number(number))),
+            Values::Text(_) => return self.push_name(&number.to_string()),
         }
         Ok(())
     }
 
     /// Adds a whole number that came as one.
-    pub fn push_count(&mut self, number: u64, column: &Column, angles: Angles) -> Result<(), Refusal> {
+    pub fn push_count(
+        &mut self,
+        number: u64,
+        column: &Column,
+        conversion: Conversion,
+    ) -> Result<(), Refusal> {
         match self {
             Values::Count(cells) => cells.push(Some(number)),
-            _ => return self.push_number(number as f64, column, angles),
+            Values::Text(_) => return self.push_name(&number.to_string()),
+            _ => return self.push_number(number as f64, column, conversion),
         }
         Ok(())
     }
 
-    /// Adds what stands in a text file. An empty text is an empty cell.
-    pub fn push_text(&mut self, text: &str, column: &Column, angles: Angles) -> Result<(), Refusal> {
-        if text.is_empty() {
+    /// Adds a time that came as one.
+    pub fn push_moment(&mut self, moment: Moment, column: &Column) -> Result<(), Refusal> {
+        match self {
+            Values::Time(cells) => cells.push(Some(moment)),
+            _ => return Err(Refusal::new("a time", column.expected())),
+        }
+        Ok(())
+    }
+
+    /// Adds what stands in a text file. An empty text is an empty cell; so is `nan` or `null` in files of others.
+    pub fn push_text(&mut self, text: &str, column: &Column, conversion: Conversion) -> Result<(), Refusal> {
+        if text.is_empty() || (conversion.foreign && is_nothing(text)) {
             return self.push_null(column);
         }
         match self {
             Values::Real(cells) => {
-                let number = match text.trim().parse::<f64>() {
-                    Ok(number) => column.real_from(number, angles)?,
-                    Err(_) if column.kind == Kind::Time => date(text, column)?,
-                    Err(_) => return Err(not_a_number(text, column)),
-                };
-                cells.push(Some(number));
+                let number = text.trim().parse::<f64>().map_err(|_| not_a_number(text, column))?;
+                cells.push(Some(column.real_from(number, conversion)?));
             }
             Values::Count(cells) => {
                 let number = match (text.trim().parse::<u64>(), text.trim().parse::<f64>()) {
@@ -108,17 +161,35 @@ impl Values {
                 };
                 cells.push(Some(number));
             }
-            Values::Text(cells) => {
-                // Sensors and objects repeat from row to row, so most rows share the text of the one before.
-                let shared = match cells.last() {
-                    Some(Some(last)) if last.as_ref() == text => Arc::clone(last),
-                    _ => Arc::from(text),
-                };
-                cells.push(Some(shared));
-            }
+            Values::Time(cells) => match Moment::parse(text) {
+                Some(moment) => cells.push(Some(moment)),
+                None => return Err(Refusal::new(format!("`{text}`"), column.expected())),
+            },
+            Values::Text(_) => return self.push_name(text),
         }
         Ok(())
     }
+
+    fn push_name(&mut self, name: &str) -> Result<(), Refusal> {
+        if let Values::Text(cells) = self {
+            // Sensors and objects repeat from row to row, so most rows share the text of the one before.
+            let shared = match cells.last() {
+                Some(Some(last)) if last.as_ref() == name => Arc::clone(last),
+                _ => Arc::from(name),
+            };
+            cells.push(Some(shared));
+        }
+        Ok(())
+    }
+}
+
+/// True for the words by which programs say that there is nothing.
+fn is_nothing(text: &str) -> bool {
+    let text = text.trim();
+    text.len() <= 4
+        && ["", "nan", "null", "none", "na", "n/a", "#n/a", "-", "--"]
+            .iter()
+            .any(|word| text.eq_ignore_ascii_case(word))
 }
 
 /// Whole numbers are often written with a decimal point by programs that know no empty whole number.
@@ -128,23 +199,6 @@ fn whole(number: f64, column: &Column) -> Result<u64, Refusal> {
         return Ok(number as u64);
     }
     Err(Refusal::new(number, column.expected()))
-}
-
-/// Seconds since 1970 of an RFC 3339 date and time.
-fn date(text: &str, column: &Column) -> Result<f64, Refusal> {
-    if let Ok(timestamp) = text.trim().parse::<jiff::Timestamp>() {
-        return Ok(unix_seconds(timestamp));
-    }
-    let refusal = Refusal::new(format!("`{text}`"), column.expected());
-    Err(match text.trim().parse::<jiff::civil::DateTime>() {
-        Ok(_) => refusal.helped("the date has no offset: add Z if it is in universal time"),
-        Err(_) => refusal,
-    })
-}
-
-/// Seconds since 1970, as near as a double comes.
-pub(crate) fn unix_seconds(timestamp: jiff::Timestamp) -> f64 {
-    timestamp.as_second() as f64 + f64::from(timestamp.subsec_nanosecond()) * 1e-9
 }
 
 fn not_a_number(text: &str, column: &Column) -> Refusal {
@@ -158,7 +212,18 @@ fn not_a_number(text: &str, column: &Column) -> Refusal {
 impl Sheet {
     pub fn new(columns: Vec<Column>) -> Self {
         let values = columns.iter().map(|column| Values::new(column.kind)).collect();
-        Sheet { columns, values, lines: Vec::new() }
+        Sheet { columns, values, spots: Vec::new() }
+    }
+
+    /// A sheet that is filled from a table, whose times are seconds.
+    pub fn settled(columns: Vec<Column>) -> Self {
+        let mut sheet = Sheet::new(columns);
+        for values in &mut sheet.values {
+            if let Values::Time(_) = values {
+                *values = Values::Real(Vec::new());
+            }
+        }
+        sheet
     }
 
     /// Number of rows.
@@ -169,12 +234,66 @@ impl Sheet {
     /// Empties the cells and keeps the columns, to be filled again.
     pub fn clear(&mut self) {
         self.values.iter_mut().for_each(Values::clear);
-        self.lines.clear();
+        self.spots.clear();
+    }
+
+    /// Forgets the rows from `len` on, the last of which may be incomplete.
+    pub fn truncate(&mut self, len: usize) {
+        self.values.iter_mut().for_each(|values| values.truncate(len));
+        self.spots.truncate(len);
+    }
+
+    /// Turns times as the file has them into seconds. Rows whose time is none are refused.
+    pub fn settle_times(
+        &mut self,
+        clock: &mut Clock,
+        file: &Arc<str>,
+        remarks: &mut Remarks,
+    ) -> Result<(), DataError> {
+        let Some(at) = self.columns.iter().position(|column| column.kind == Kind::Time) else {
+            return Ok(());
+        };
+        let Values::Time(moments) = std::mem::replace(&mut self.values[at], Values::Real(Vec::new())) else {
+            return Ok(());
+        };
+        let names = ["sensor", "object"].into_iter().find_map(|name| self.position(name));
+        let mut wanted = vec![true; moments.len()];
+        let mut seconds = Vec::with_capacity(moments.len());
+        for (row, moment) in moments.into_iter().enumerate() {
+            let name = names.and_then(|at| match &self.values[at] {
+                Values::Text(cells) => cells[row].as_ref(),
+                _ => None,
+            });
+            seconds.push(match moment.map(|moment| clock.seconds(moment, name)).transpose() {
+                Ok(time) => time,
+                Err(refusal) => {
+                    remarks.refuse(refusal.at(self.place(file, row), &self.columns[at].name))?;
+                    wanted[row] = false;
+                    None
+                }
+            });
+        }
+        self.values[at] = Values::Real(seconds);
+        if wanted.contains(&false) {
+            self.values.iter_mut().for_each(|values| values.retain(&wanted));
+            let mut wanted = wanted.iter();
+            self.spots.retain(|_| wanted.next().copied().unwrap_or(true));
+        }
+        Ok(())
+    }
+
+    /// The times of the file, before they are settled.
+    pub fn times(&self) -> Times<'_> {
+        let times = self.values.iter().find_map(|values| match values {
+            Values::Time(cells) => Some(cells.as_slice()),
+            _ => None,
+        });
+        Times { cells: times.unwrap_or_default() }
     }
 
     /// Where a row stands in `file`.
     pub fn place(&self, file: &Arc<str>, row: usize) -> Place {
-        let spot = self.lines.get(row).map_or(Spot::Row(row as u64), |line| Spot::Line(*line));
+        let spot = self.spots.get(row).copied().unwrap_or(Spot::Row(row as u64));
         Place { file: Arc::clone(file), spot }
     }
 
@@ -225,8 +344,8 @@ fn refused(column: &Column, values: &Values, row: usize) -> Option<Refusal> {
         return column.needed.then(|| Refusal::new("empty", column.expected()));
     }
     match values {
-        Values::Real(cells) => cells[row].and_then(|number| column.real_from(number, Angles::Radians).err()),
-        Values::Count(_) | Values::Text(_) => None,
+        Values::Real(cells) => cells[row].and_then(|number| column.check(number).err()),
+        Values::Count(_) | Values::Text(_) | Values::Time(_) => None,
     }
 }
 

@@ -35,7 +35,7 @@ fn to_sink<W: Write + Send, T: Layout>(
     file: &Arc<str>,
 ) -> Result<W, DataError> {
     let metadata = table.metadata();
-    let mut sheet = Sheet::new(T::columns(&metadata));
+    let mut sheet = Sheet::settled(T::columns(&metadata));
     table.fill(&mut sheet, file)?;
     let mut writer = SheetWriter::new(sink, format, &sheet.columns, metadata, file)?;
     writer.write(&sheet, file)?;
@@ -212,7 +212,7 @@ impl<'a> TracksWriter<'a> {
     }
 
     fn begin(sink: Sink<'a>, format: Format, file: Arc<str>, head: &Tracks) -> Result<Self, DataError> {
-        let sheet = Sheet::new(track_columns(&head.labels, &head.modes));
+        let sheet = Sheet::settled(track_columns(&head.labels, &head.modes));
         let writer = SheetWriter::new(sink, format, &sheet.columns, head.metadata(), &file)?;
         let (labels, modes) = (head.labels.clone(), head.modes.clone());
         let mut tracks = TracksWriter { writer, sheet, labels, modes, file };

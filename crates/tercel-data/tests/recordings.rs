@@ -140,7 +140,10 @@ fn dates_are_read_as_the_whole_file_tells_and_refused_where_nothing_does() {
     assert!(march.notes[0].contains("month first"), "{:?}", march.notes);
     let ambiguous = "mmsi,timestamp,lat,lon\n1,03/12/2024 10:00:00,56,11\n1,03/12/2024 10:00:10,56,11.001\n";
     let read = |order| {
-        let options = ImportOptions { date_order: order, ..ImportOptions::default() };
+        let options = ImportOptions {
+            read: ReadOptions { date_order: order, ..ReadOptions::default() },
+            ..ImportOptions::default()
+        };
         import_from(Source::Ais, ambiguous.as_bytes(), "ships.csv", &options)
     };
     let error = read(None).unwrap_err();

@@ -10,13 +10,16 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::column::Column;
+use crate::column::{Column, Conversion};
 use crate::error::{DataError, Place};
-use crate::layout::{Context, Layout, match_header};
+use crate::layout::{Context, Layout, check_names};
 use crate::metadata::Metadata;
+use crate::names::Naming;
 use crate::options::ReadOptions;
 use crate::remarks::Remarks;
 use crate::sheet::Sheet;
+use crate::time::Clock;
+use crate::unit::Unit;
 
 pub(crate) use crate::source::{decompressed, file_name, open, read_error};
 
@@ -81,7 +84,17 @@ impl Format {
 /// What the beginning of a file says: its description and its columns, with where they stand in the file.
 pub(crate) struct Plan {
     pub metadata: Metadata,
-    pub columns: Vec<(usize, Column)>,
+    pub columns: Vec<Source>,
+    /// Times are seconds, as our own files have them, or are of the unit that their column names.
+    pub time_unit: Option<Unit>,
+    pub ours: bool,
+}
+
+/// A column of a table and where it comes from.
+pub(crate) struct Source {
+    pub at: usize,
+    pub column: Column,
+    pub conversion: Conversion,
 }
 
 impl Plan {
@@ -90,18 +103,68 @@ impl Plan {
         described: Option<Metadata>,
         file: &Arc<str>,
         options: &ReadOptions,
+        remarks: &mut Remarks,
     ) -> Result<Self, DataError> {
-        let metadata = described.unwrap_or_else(|| T::guess(found));
-        let columns = options.relaxed(T::columns(&metadata));
-        no_repetition(&columns, file)?;
-        metadata.check_units(&columns, options.angles, file)?;
-        let columns = match_header(found, columns, file)?;
-        Ok(Plan { metadata, columns })
+        let trouble = |(problem, help)| DataError::unsettled(Place::whole(file), problem, help);
+        let ours = described.is_some();
+        let (metadata, naming) = naming::<T>(found, described, file, options)?;
+        let choice = naming.choose(found).map_err(trouble)?;
+        check_names(&naming, &choice, found, file)?;
+        remarks.notes.extend(choice.notes);
+        if !ours && !choice.unused.is_empty() {
+            remarks.notes.push(unused(&choice.unused));
+        }
+        let time_unit = choice.used.iter().find_map(|(_, meaning)| meaning.time_unit);
+        let mut used = choice.used;
+        used.sort_by_key(|(_, meaning)| meaning.column);
+        let columns = used
+            .into_iter()
+            .map(|(at, meaning)| Source {
+                at,
+                column: naming.columns()[meaning.column].clone(),
+                conversion: meaning.conversion,
+            })
+            .collect();
+        Ok(Plan { metadata, columns, ours, time_unit: if ours { Some(Unit::Second) } else { time_unit } })
     }
 
     pub fn sheet(&self) -> Sheet {
-        Sheet::new(self.columns.iter().map(|(_, column)| column.clone()).collect())
+        Sheet::new(self.columns.iter().map(|source| source.column.clone()).collect())
     }
+}
+
+/// The description of a file and the names of its columns.
+pub(crate) fn naming<T: Layout>(
+    found: &[String],
+    described: Option<Metadata>,
+    file: &Arc<str>,
+    options: &ReadOptions,
+) -> Result<(Metadata, Naming), DataError> {
+    let ours = described.is_some();
+    let metadata = match described {
+        Some(metadata) => metadata,
+        None => {
+            let widest = Naming::new(T::TABLE, false, T::columns(&T::widest()), options);
+            T::guess(&widest.in_our_words(found))
+        }
+    };
+    let mut columns = options.relaxed(T::columns(&metadata));
+    no_repetition(&columns, file)?;
+    metadata.check_units(&columns, options.angles, file)?;
+    if !ours {
+        columns.extend(T::foreign_columns());
+    }
+    Ok((metadata, Naming::new(T::TABLE, ours, columns, options)))
+}
+
+/// Names the columns that nothing was read from.
+pub(crate) fn unused(names: &[String]) -> String {
+    const SHOWN: usize = 16;
+    let mut text = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN {
+        text.push_str(&format!(" and {} more", names.len() - SHOWN));
+    }
+    format!("not used: {text}")
 }
 
 /// Refuses names of components and modes that make two columns one.
@@ -124,6 +187,10 @@ pub(crate) struct Content {
     pub metadata: Metadata,
     /// Names of all columns of the file.
     pub found: Vec<String>,
+    /// The unit of its times, where it is known.
+    pub time_unit: Option<Unit>,
+    /// The file is one of our own.
+    pub ours: bool,
 }
 
 /// Reads a table from a stream that is already decompressed.
@@ -137,12 +204,24 @@ pub(crate) fn read_table<T: Layout>(
     if reader.fill_buf().map_err(|error| read_error(file, error))?.is_empty() {
         return Err(DataError::Empty { file: Arc::clone(file) });
     }
-    let Content { sheet, metadata, found } = match format {
+    let Content { mut sheet, metadata, found, time_unit, ours } = match format {
         Format::Csv => csv::read::<T>(reader, file, options, remarks)?,
-        Format::Parquet => parquet::read::<T>(reader, file, options)?,
-        Format::Ndjson => return T::from_lines(reader, file, options, remarks),
+        Format::Parquet => parquet::read::<T>(reader, file, options, remarks)?,
+        Format::Ndjson => json::read::<T>(reader, file, options, remarks)?,
     };
-    T::from_sheet(&sheet, metadata, &Context { file, options, found: &found })
+    let mut clock = Clock::new(options, time_unit, file)?;
+    let looked = clock.look_at(&sheet.times());
+    remarks
+        .notes
+        .extend(looked.map_err(|(problem, help)| DataError::unsettled(Place::whole(file), problem, help))?);
+    sheet.settle_times(&mut clock, file, remarks)?;
+    remarks.notes.extend(clock.note());
+    T::from_sheet(
+        &sheet,
+        metadata,
+        &Context { file, options, found: &found, ours, keyed: format == Format::Ndjson },
+        remarks,
+    )
 }
 
 /// Writes sheets one after another in one of the formats.

@@ -14,7 +14,7 @@
 //! exactEarth, Global Fishing Watch and BarentsWatch come in as they are.
 //!
 //! - Dates such as `03/05/2024` are read with the day first or the month first as the rest of the file tells. Where
-//!   nothing in the file tells, it is refused, unless [`ImportOptions::date_order`](super::ImportOptions) says it; the Danish
+//!   nothing in the file tells, it is refused, unless [`ReadOptions::date_order`](crate::ReadOptions) says it; the Danish
 //!   export has the day first.
 //! - The second of the minute (0 to 59), which AIS messages carry, is never taken for a time.
 //! - Rows whose position is "not available" (latitude 91, longitude 181, or empty) are left out and counted.
@@ -37,8 +37,8 @@ use super::input::Input;
 use super::report::{NOWHERE, Report, Reporter, Step};
 use super::station::Station;
 use super::table::{DEGREES, Field, KNOT, KNOTS, Names, PLAIN, Table, plain};
-use super::time::DateOrder;
 use crate::error::DataError;
+use crate::options::{DateOrder, ReadOptions};
 
 const TIME: Names = Names(&[(
     PLAIN,
@@ -117,8 +117,9 @@ impl Ships {
             return Err(table.missing(&missing));
         }
         let danish = table.columns().any(|column| plain(&column.name) == "typeofmobile");
-        let order = options.date_order.or(danish.then_some(DateOrder::DayFirst));
-        let clock = input.clock(|| clock::settle(open()?, &TIME, order))?;
+        let order = options.read.date_order.or(danish.then_some(DateOrder::DayFirst));
+        let read = ReadOptions { date_order: order, ..options.read.clone() };
+        let clock = input.clock(|| clock::settle(open()?, &TIME, &read))?;
         let field = |names| table.field(names);
         Ok(Ships {
             time: table.column(&clock.column),

@@ -1,18 +1,18 @@
-//! How the times of a table are to be read, which only many of its rows can tell.
+//! Which column of a table is the time, and how its times are read: only many of its rows can tell.
 
 use super::table::{Cell, Field, Names, Table, plain};
-use super::time::{DateOrder, Moment, seconds};
 use crate::error::{DataError, Refusal};
+use crate::options::{DateOrder, ReadOptions};
+use crate::time::{Clock as Reader, Moment};
+use crate::unit::Unit;
 
 /// Reads the times of a table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Clock {
     /// Name of the column with the times.
     pub column: String,
-    order: Option<DateOrder>,
-    /// Numbers are days of a spreadsheet.
-    days: bool,
     pub notes: Vec<String>,
+    reader: Reader,
 }
 
 /// What one column of times holds.
@@ -36,13 +36,13 @@ impl Look {
     fn add(&mut self, moment: Moment) {
         self.read += 1;
         match moment {
-            Moment::Date(_) => {}
-            Moment::Either { day_first, month_first } => {
+            Moment::Slashed { first, second, .. } => {
                 self.either += 1;
-                self.day_first += u64::from(month_first.is_none());
-                self.month_first += u64::from(day_first.is_none());
+                self.day_first += u64::from(first > 12);
+                self.month_first += u64::from(second > 12);
             }
             Moment::Number(number) => self.add_number(number),
+            Moment::Instant(_) | Moment::Civil(_) | Moment::OfDay(_) => {}
         }
     }
 
@@ -78,8 +78,15 @@ impl Look {
             && self.largest - self.smallest < 400.0
     }
 
-    fn has_order(&self) -> bool {
-        self.either == 0 || self.day_first + self.month_first > 0
+    /// The order of day and month, if there are dates whose order is to be told; the error says why it cannot be.
+    fn order(&self) -> Result<Option<DateOrder>, &'static str> {
+        match (self.either, self.day_first, self.month_first) {
+            (0, ..) => Ok(None),
+            (_, 0, 0) => Err("every date in it could be read with the day or the month first"),
+            (_, _, 0) => Ok(Some(DateOrder::DayFirst)),
+            (_, 0, _) => Ok(Some(DateOrder::MonthFirst)),
+            _ => Err("some of its dates begin with the day and some with the month"),
+        }
     }
 }
 
@@ -91,9 +98,9 @@ const SAMPLE: u64 = 1000;
 /// # Errors
 /// When there is no column of times, when the only one is the second of the minute, and when day and month cannot be told
 /// apart in the whole file.
-pub(super) fn settle(mut table: Table, names: &Names, order: Option<DateOrder>) -> Result<Clock, DataError> {
-    let fields: Vec<Field> = table.fields(names).chain(others(&table)).collect();
-    let known = table.fields(names).count();
+pub(super) fn settle(mut table: Table, names: &Names, options: &ReadOptions) -> Result<Clock, DataError> {
+    let known: Vec<Field> = table.fields(names).collect();
+    let fields: Vec<Field> = known.iter().cloned().chain(others(&table, &known)).collect();
     let mut looks: Vec<Look> = fields.iter().map(|_| Look::default()).collect();
     let mut rows = 0;
     while rows < SAMPLE && advance(&mut table)? {
@@ -104,38 +111,50 @@ pub(super) fn settle(mut table: Table, names: &Names, order: Option<DateOrder>) 
             }
         }
     }
-    let usable = |(field, look): &(&Field, &Look)| look.read > 0 && !look.is_second_of_minute(&field.name);
-    let plausible = |(_, look): &(&Field, &Look)| look.numbers == 0 || look.largest > 1e8;
-    let pairs = || fields.iter().zip(&looks);
-    let chosen = pairs().take(known).position(|pair| usable(&pair)).or_else(|| {
-        pairs().skip(known).position(|pair| usable(&pair) && plausible(&pair)).map(|at| at + known)
-    });
-    let Some(at) = chosen else {
-        return match pairs().take(known).find(|(field, look)| look.is_second_of_minute(&field.name)) {
+    let Some(at) = chosen(&fields, &looks, known.len()) else {
+        let mut pairs = known.iter().zip(&looks);
+        return match pairs.find(|(field, look)| look.is_second_of_minute(&field.name)) {
             Some((field, _)) => Err(second_of_minute(&table, field)),
+            None if known.is_empty() => Err(table.missing(&[names])),
             // Without a time in any row, all rows are left out and counted.
-            None if known > 0 => Ok(Clock::plain(&fields[0].name)),
-            None => Err(table.missing(&[names])),
+            None => Clock::new(&known[0], &Look::default(), None, options, &table),
         };
     };
     let (field, look) = (&fields[at], &mut looks[at]);
-    while order.is_none() && !look.has_order() && advance(&mut table)? {
-        if let Some(moment @ Moment::Either { .. }) = moment(&table, field) {
-            look.add(moment);
+    if options.date_order.is_none() {
+        while look.order().is_err() && advance(&mut table)? {
+            if let Some(moment @ Moment::Slashed { .. }) = moment(&table, field) {
+                look.add(moment);
+            }
         }
     }
-    Clock::of(field, look, order, at >= known).map_err(|problem| {
-        let problem = format!("column `{}`: {problem}", field.name);
-        let help = "say which it is: --date-order day-first or --date-order month-first";
-        DataError::unsettled(table.whole(), problem, help)
-    })
+    let order =
+        options.date_order.map_or_else(|| look.order(), |order| Ok(Some(order))).map_err(|problem| {
+            let problem = format!("column `{}`: {problem}", field.name);
+            let help = "say which it is: --date-order day-first or --date-order month-first";
+            DataError::unsettled(table.whole(), problem, help)
+        })?;
+    let mut clock = Clock::new(field, look, order, options, &table)?;
+    if at >= known.len() {
+        clock.notes.insert(0, format!("the times are those of column `{}`", field.name));
+    }
+    Ok(clock)
+}
+
+/// The best column: the first with a known name that holds times, or one that sounds like times and holds dates or Unix times.
+fn chosen(fields: &[Field], looks: &[Look], known: usize) -> Option<usize> {
+    let usable = |at: usize| looks[at].read > 0 && !looks[at].is_second_of_minute(&fields[at].name);
+    let plausible = |at: usize| looks[at].numbers == 0 || looks[at].largest > 1e8;
+    let first = (0..known).find(|at| usable(*at));
+    first.or_else(|| (known..fields.len()).find(|at| usable(*at) && plausible(*at)))
 }
 
 /// Columns whose names sound like times but are not known.
-fn others(table: &Table) -> Vec<Field> {
+fn others(table: &Table, known: &[Field]) -> Vec<Field> {
     const SOUNDS: [&str; 4] = ["time", "date", "received", "utc"];
     let sounds = |name: &str| SOUNDS.iter().any(|sound| plain(name).contains(sound));
-    table.columns().filter(|field| sounds(&field.name)).collect()
+    let new = |field: &Field| known.iter().all(|known| known.name != field.name);
+    table.columns().filter(|field| sounds(&field.name) && new(field)).collect()
 }
 
 /// Goes on to the next row, past those that cannot be read: they are refused or counted later.
@@ -151,9 +170,9 @@ fn advance(table: &mut Table) -> Result<bool, DataError> {
 fn moment(table: &Table, field: &Field) -> Option<Moment> {
     match table.cell(field) {
         Cell::Nothing => None,
-        Cell::Text(text) => Moment::read(&text),
+        Cell::Text(text) => Moment::parse(&text),
         Cell::Number(number) => Some(Moment::Number(number)),
-        Cell::Time(time) => Some(Moment::Date(time)),
+        Cell::Time(time) => Some(Moment::Instant(time)),
     }
 }
 
@@ -169,71 +188,43 @@ fn second_of_minute(table: &Table, field: &Field) -> DataError {
 }
 
 impl Clock {
-    fn plain(column: &str) -> Self {
-        Clock { column: column.to_owned(), order: None, days: false, notes: Vec::new() }
-    }
-
-    fn of(field: &Field, look: &Look, order: Option<DateOrder>, other: bool) -> Result<Self, String> {
-        let mut clock = Clock { order, ..Clock::plain(&field.name) };
-        if other {
-            clock.notes.push(format!("the times are those of column `{}`", field.name));
+    fn new(
+        field: &Field,
+        look: &Look,
+        order: Option<DateOrder>,
+        options: &ReadOptions,
+        table: &Table,
+    ) -> Result<Self, DataError> {
+        let mut notes = Vec::new();
+        let mut time_unit = options.time_unit;
+        if time_unit.is_none() && look.is_days() {
+            time_unit = Some(Unit::Day);
+            notes.push(format!("the times in column `{}` are read as days of a spreadsheet", field.name));
         }
-        if look.is_days() {
-            clock.days = true;
-            clock
-                .notes
-                .push(format!("the times in column `{}` are read as days of a spreadsheet", field.name));
+        if let (Some(order), None) = (order, options.date_order) {
+            let first = if order == DateOrder::DayFirst { "day" } else { "month" };
+            notes.push(format!("the dates in column `{}` are read with the {first} first", field.name));
         }
-        if order.is_none() && look.either > 0 {
-            clock.order = match (look.day_first, look.month_first) {
-                (0, 0) => {
-                    return Err("every date in it could be read with the day or the month first".to_owned());
-                }
-                (_, 0) => Some(DateOrder::DayFirst),
-                (0, _) => Some(DateOrder::MonthFirst),
-                _ => return Err("some of its dates begin with the day and some with the month".to_owned()),
-            };
-            let first = if clock.order == Some(DateOrder::DayFirst) { "day" } else { "month" };
-            clock.notes.push(format!("the dates in column `{}` are read with the {first} first", field.name));
-        }
-        Ok(clock)
+        let options = ReadOptions { date_order: order, time_unit, ..options.clone() };
+        let reader = Reader::new(&options, None, &table.whole().file)?;
+        Ok(Clock { column: field.name.clone(), notes, reader })
     }
 
     /// The time of a row in Unix seconds.
-    pub fn time(&self, table: &Table, field: &Field) -> Result<Option<f64>, DataError> {
-        let read = match table.cell(field) {
+    pub fn time(&mut self, table: &Table, field: &Field) -> Result<Option<f64>, DataError> {
+        const EXPECTED: &str = "a time: Unix seconds, or a date and time such as 2016-01-12T13:02:11Z";
+        let moment = match table.cell(field) {
             Cell::Nothing => return Ok(None),
-            Cell::Time(time) => Some(time),
-            Cell::Number(number) => Some(self.of_number(number)),
-            Cell::Text(text) => match Moment::read(&text) {
-                Some(Moment::Date(time)) => Some(time),
-                Some(Moment::Number(number)) => Some(self.of_number(number)),
-                Some(Moment::Either { month_first, .. }) if self.order == Some(DateOrder::MonthFirst) => {
-                    month_first
+            Cell::Time(time) => return Ok(Some(time)),
+            Cell::Number(number) => Moment::Number(number),
+            Cell::Text(text) => match Moment::parse(&text) {
+                // The day of a time of day is not known.
+                None | Some(Moment::OfDay(_)) => {
+                    return Err(table.refuse(field, Refusal::new(format!("`{text}`"), EXPECTED)));
                 }
-                Some(Moment::Either { day_first, .. }) => day_first,
-                None => None,
+                Some(moment) => moment,
             },
         };
-        read.map(Some).ok_or_else(|| {
-            let text = table.text(field).unwrap_or_default();
-            table.refuse(field, Refusal::new(format!("`{text}`"), self.expected()))
-        })
-    }
-
-    fn of_number(&self, number: f64) -> f64 {
-        /// 1 January 1970 in days of a spreadsheet.
-        const EPOCH: f64 = 25_569.0;
-        if self.days { (number - EPOCH) * 86_400.0 } else { seconds(number) }
-    }
-
-    fn expected(&self) -> &'static str {
-        match self.order {
-            None => "a time: Unix seconds, or a date and time such as 2016-01-12T13:02:11Z",
-            Some(DateOrder::DayFirst) => "a date and time with the day first, such as 31/12/2019 23:59:58",
-            Some(DateOrder::MonthFirst) => {
-                "a date and time with the month first, such as 12/31/2019 23:59:58"
-            }
-        }
+        self.reader.seconds(moment, None).map(Some).map_err(|refusal| table.refuse(field, refusal))
     }
 }

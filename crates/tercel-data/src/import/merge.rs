@@ -5,10 +5,11 @@ use std::collections::BinaryHeap;
 
 use super::ImportOptions;
 use super::input::Input;
-use super::report::{Account, Report, Reports};
+use super::report::{Report, Reports};
 use super::source::Source;
 use super::survey::Times;
 use crate::error::DataError;
+use crate::remarks::Remarks;
 
 /// One file, which is open from its first report to its last.
 ///
@@ -61,7 +62,7 @@ impl Part {
     }
 
     /// Reads until the earliest report that is held back is the next one.
-    fn fill(&mut self, account: &mut Account) -> Result<(), DataError> {
+    fn fill(&mut self, remarks: &mut Remarks) -> Result<(), DataError> {
         // Differences of large times are rounded.
         const ROUNDED: f64 = 1e-3;
         let Part { times, reports: Some(reports), held, latest, taken, ended, .. } = self else {
@@ -77,7 +78,7 @@ impl Part {
                 }
                 None => {
                     *ended = true;
-                    account.join(std::mem::take(&mut reports.account));
+                    remarks.join(std::mem::take(&mut reports.remarks));
                 }
             }
         }
@@ -91,7 +92,7 @@ pub(super) struct Merged {
     source: Source,
     options: ImportOptions,
     /// What became of the rows of the files that were read to their ends.
-    account: Account,
+    remarks: Remarks,
 }
 
 impl Merged {
@@ -109,13 +110,13 @@ impl Merged {
             parts: files.into_iter().map(part).collect(),
             source,
             options: options.clone(),
-            account: Account::default(),
+            remarks: Remarks::default(),
         }
     }
 
     /// Adds what became of the rows of a file without reports.
-    pub fn add(&mut self, account: Account) {
-        self.account.join(account);
+    pub fn add(&mut self, remarks: Remarks) {
+        self.remarks.join(remarks);
     }
 
     /// The next report.
@@ -123,7 +124,7 @@ impl Merged {
         let Some(at) = self.earliest()? else { return Ok(None) };
         let part = &mut self.parts[at];
         let report = part.held.pop().map(|held| held.report);
-        part.fill(&mut self.account)?;
+        part.fill(&mut self.remarks)?;
         if part.ended && part.held.is_empty() {
             // A file that is read to its end is closed.
             part.reports = None;
@@ -146,15 +147,15 @@ impl Merged {
                 return Ok(Some(at));
             }
             part.reports = Some(super::open_reports(self.source, &part.input, &self.options)?);
-            part.fill(&mut self.account)?;
+            part.fill(&mut self.remarks)?;
         }
     }
 
     /// What became of the rows that are no reports, so far.
-    pub fn account(&self) -> Account {
-        let mut account = self.account.clone();
+    pub fn remarks(&self) -> Remarks {
+        let mut remarks = self.remarks.clone();
         let open = self.parts.iter().filter_map(|part| part.reports.as_ref());
-        open.for_each(|reports| account.join(reports.account.clone()));
-        account
+        open.for_each(|reports| remarks.join(reports.remarks.clone()));
+        remarks
     }
 }

@@ -18,7 +18,6 @@ mod station;
 mod survey;
 mod table;
 mod tables;
-mod time;
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -30,7 +29,6 @@ pub use self::recording::Recording;
 use self::report::{Reporter, Reports};
 use self::source::Kind;
 pub use self::source::Source;
-pub use self::time::DateOrder;
 use crate::error::DataError;
 use crate::options::ReadOptions;
 use crate::table::{Detections, Origin, Truths};
@@ -38,7 +36,7 @@ use crate::table::{Detections, Origin, Truths};
 /// How a recording is brought in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportOptions {
-    /// How a canonical table is read, and what becomes of rows that cannot be used.
+    /// How tables are read: times, dates, and what becomes of rows that cannot be used, of all sources.
     pub read: ReadOptions,
     /// Origin of the local frame for sources with geographic coordinates; without one, their median position.
     pub origin: Option<Origin>,
@@ -52,8 +50,6 @@ pub struct ImportOptions {
     pub split_callsigns: bool,
     /// Whether base stations, aids to navigation and aircraft in AIS are kept.
     pub all_stations: bool,
-    /// Which number of a date such as `03/05/2024` is the month, where the file does not tell.
-    pub date_order: Option<DateOrder>,
 }
 
 impl Default for ImportOptions {
@@ -66,7 +62,6 @@ impl Default for ImportOptions {
             reported_time: false,
             split_callsigns: false,
             all_stations: false,
-            date_order: None,
         }
     }
 }

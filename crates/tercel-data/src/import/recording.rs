@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use super::input::Input;
 use super::merge::Merged;
-use super::report::Account;
 use super::scans::Framing;
 use super::source::{Family, Kind, Source};
 use super::survey::Survey;
 use super::{ImportOptions, Imported, LeftOut, open_reports, tables};
 use crate::error::DataError;
+use crate::remarks::Remarks;
 use crate::table::{Description, Origin, Scan, SensorDescription, Truths};
 
 /// A recording, scan by scan, in the order of time.
@@ -40,11 +40,11 @@ pub struct Recording {
 
 enum Content {
     /// Scans that are in memory, with what is worth saying of them.
-    Tables(std::vec::IntoIter<Scan>, Account),
+    Tables(std::vec::IntoIter<Scan>, Remarks),
     /// Reports that are read as they are asked for.
     Reports(Box<Stream>),
     /// Reports of which there are none.
-    Nothing(Account),
+    Nothing(Remarks),
 }
 
 struct Stream {
@@ -91,10 +91,13 @@ impl Recording {
 
     fn of_tables(imported: Imported) -> Self {
         let Imported { detections, left_out, notes, .. } = imported;
+        let mut remarks = Remarks::default();
+        notes.into_iter().for_each(|note| remarks.note(note));
+        left_out.into_iter().for_each(|LeftOut { reason, rows }| remarks.leave_out(reason, rows));
         Recording {
             origin: detections.origin,
             description: detections.description,
-            content: Content::Tables(detections.scans.into_iter(), Account { left_out, notes }),
+            content: Content::Tables(detections.scans.into_iter(), remarks),
         }
     }
 
@@ -106,12 +109,12 @@ impl Recording {
     ) -> Result<Self, DataError> {
         let mut survey = Survey::default();
         let mut files = Vec::new();
-        let mut empty = Account::default();
+        let mut empty = Remarks::default();
         for input in inputs {
             let mut reports = open_reports(source, &input, options)?;
             match survey.look(&mut reports, family)? {
                 Some(times) => files.push((input, times)),
-                None => empty.join(reports.account),
+                None => empty.join(reports.remarks),
             }
         }
         let name = files.first().map(|(input, _)| Arc::clone(&input.name));
@@ -145,18 +148,18 @@ impl Recording {
 
     /// Rows that are not in the scans, by reason; complete when all scans were taken.
     pub fn left_out(&self) -> Vec<LeftOut> {
-        self.account().left_out
+        self.remarks().left_out
     }
 
     /// What was decided while reading and the user should know, in sentences; complete when all scans were taken.
     pub fn notes(&self) -> Vec<String> {
-        self.account().notes
+        self.remarks().notes
     }
 
-    fn account(&self) -> Account {
+    fn remarks(&self) -> Remarks {
         match &self.content {
-            Content::Tables(_, account) | Content::Nothing(account) => account.clone(),
-            Content::Reports(stream) => stream.account(),
+            Content::Tables(_, remarks) | Content::Nothing(remarks) => remarks.clone(),
+            Content::Reports(stream) => stream.remarks(),
         }
     }
 
@@ -168,7 +171,7 @@ impl Recording {
         }
         imported.detections.origin = self.origin;
         imported.detections.description = std::mem::take(&mut self.description);
-        let Account { left_out, notes } = self.account();
+        let Remarks { left_out, notes, .. } = self.remarks();
         let rows = match self.content {
             Content::Reports(stream) => stream.framing.truths.unwrap_or_default(),
             _ => Vec::new(),
@@ -203,10 +206,10 @@ impl Stream {
         Ok(None)
     }
 
-    fn account(&self) -> Account {
-        let mut account = self.merged.account();
-        account.leave_out("the same report from another receiver", self.framing.repeated);
-        account
+    fn remarks(&self) -> Remarks {
+        let mut remarks = self.merged.remarks();
+        remarks.leave_out("the same report from another receiver", self.framing.repeated);
+        remarks
     }
 }
 

@@ -17,13 +17,13 @@ use std::collections::HashMap;
 use std::io::BufRead;
 use std::sync::Arc;
 
+use super::ImportOptions;
 use super::input::Input;
 use super::report::{NOWHERE, Report, Reporter, Step};
 use super::table::{FOOT, KNOT, SKIP};
-use super::time::Moment;
-use super::{ImportOptions, time};
 use crate::error::{DataError, Place, Refusal};
 use crate::source::{Text, read_error, text};
+use crate::time::Moment;
 
 /// Cells of a message, counted from 0.
 const ADDRESS: usize = 4;
@@ -187,8 +187,8 @@ impl<'a> Cells<'a> {
     /// Date and time in two cells.
     fn time(&self, at: usize) -> Result<Option<f64>, DataError> {
         let Some((date, time)) = self.get(at).zip(self.get(at + 1)) else { return Ok(None) };
-        match time::Moment::read(&format!("{date} {time}")) {
-            Some(Moment::Date(time)) => Ok(Some(time)),
+        match Moment::parse(&format!("{date} {time}")) {
+            Some(Moment::Civil(time) | Moment::Instant(time)) => Ok(Some(time)),
             _ => Err(self.refuse(
                 at,
                 &format!("{date},{time}"),

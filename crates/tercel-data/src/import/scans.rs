@@ -8,7 +8,8 @@ use tercel_core::geo::{Geodetic, LocalFrame};
 
 use super::report::Report;
 use super::source::Family;
-use crate::error::{DataError, Place};
+use crate::error::DataError;
+use crate::geographic::frame;
 use crate::table::{Detection, Observation, Origin, Scan, Truth};
 
 /// Turns reports, which come in the order of time, into scans.
@@ -41,15 +42,8 @@ impl Framing {
         keep_repeated: bool,
         file: &Arc<str>,
     ) -> Result<Self, DataError> {
-        let Origin { latitude, longitude, altitude } = origin;
-        let frame =
-            LocalFrame::new(Geodetic { latitude, longitude, altitude }).map_err(|error| DataError::Row {
-                place: Place::whole(file),
-                problem: format!("the origin of the local frame is not on the Earth: {error}"),
-                help: "latitude and longitude of the origin are radians, the altitude is m",
-            })?;
         Ok(Framing {
-            frame,
+            frame: frame(origin, file)?,
             family,
             sensor: family.sensor.into(),
             keep_repeated,

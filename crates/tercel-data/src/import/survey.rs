@@ -6,14 +6,14 @@ use std::sync::Arc;
 use super::report::{Report, Reports};
 use super::scans::same_report;
 use super::source::Family;
-use crate::column::wrapped;
 use crate::error::DataError;
+use crate::geographic::middle_around;
 use crate::table::Origin;
 
 /// What must be known before reports become scans.
 #[derive(Debug, Default)]
 pub(super) struct Survey {
-    positions: Sample<[f64; 2]>,
+    positions: Sample<(f64, f64)>,
     /// Time and longitude of the earliest report.
     earliest: Option<(f64, f64)>,
     intervals: Sample<f64>,
@@ -56,7 +56,7 @@ impl Survey {
     }
 
     fn add(&mut self, report: Report, family: &Family) {
-        self.positions.add([report.latitude, report.longitude]);
+        self.positions.add((report.latitude, report.longitude));
         if self.earliest.is_none_or(|(time, _)| report.time < time) {
             self.earliest = Some((report.time, report.longitude));
         }
@@ -87,13 +87,8 @@ impl Survey {
 
     /// The median position of the reports, on the ellipsoid.
     pub fn middle(&self) -> Option<Origin> {
-        // Longitudes near the date line are turned so that they do not fall apart.
-        let (_, first) = self.earliest?;
-        let near = |longitude: f64| first + wrapped(longitude - first);
-        let all = || self.positions.kept.iter();
-        let latitude = median(all().map(|position| position[0]).collect())?;
-        let longitude = wrapped(median(all().map(|position| near(position[1])).collect())?);
-        Some(Origin { latitude, longitude, altitude: 0.0 })
+        let (_, longitude) = self.earliest?;
+        middle_around(longitude, self.positions.kept.iter().copied())
     }
 
     /// Median time between the reports of one object, s, in whole milliseconds.

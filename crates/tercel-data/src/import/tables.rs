@@ -7,7 +7,9 @@ use super::source::{Kind, Source};
 use super::{ImportOptions, Imported, autoferry};
 use crate::error::DataError;
 use crate::import::LeftOut;
+use crate::options::ReadOptions;
 use crate::read::{read_as, read_stream_as};
+use crate::table::Origin;
 
 /// Brings in files.
 pub(super) fn import<P: AsRef<Path>>(
@@ -18,8 +20,10 @@ pub(super) fn import<P: AsRef<Path>>(
     let mut whole: Option<Imported> = None;
     for path in paths {
         let path = path.as_ref();
+        // All files share the frame of the first.
+        let origin = whole.as_ref().and_then(|whole| whole.detections.origin);
         let part = match source.kind() {
-            Kind::Table(format) => read_as(path, format, &options.read)?,
+            Kind::Table(format) => read_as(path, format, &read_options(options, origin))?,
             _ => autoferry::read(path, options)?,
         };
         whole = Some(match whole {
@@ -38,12 +42,17 @@ pub(super) fn import_from(
     options: &ImportOptions,
 ) -> Result<Imported, DataError> {
     match source.kind() {
-        Kind::Table(format) => read_stream_as(reader, format, name, &options.read),
+        Kind::Table(format) => read_stream_as(reader, format, name, &read_options(options, None)),
         _ => {
             let detections = autoferry::read_detections_from(reader, name)?;
             Ok(Imported { detections, ..Imported::default() })
         }
     }
+}
+
+/// How a table is read whose positions may be latitudes and longitudes.
+fn read_options(options: &ImportOptions, origin: Option<Origin>) -> ReadOptions {
+    ReadOptions { origin: options.origin.or(options.read.origin).or(origin), ..options.read.clone() }
 }
 
 /// Appends a recording to another; detections are numbered anew, since two files may use the same numbers.

@@ -1,20 +1,20 @@
 //! Columns of the detections: one row per detection, and one for each scan without any.
 
 use std::collections::HashSet;
-use std::io::BufRead;
 use std::sync::Arc;
 
-use super::header::missing_columns;
-use super::{Context, Group, Layout};
+use tercel_core::geo::LocalFrame;
+
+use super::rows::Rows;
+use super::scans::scans;
+use super::{Context, Layout};
 use crate::column::{Column, Limits};
 use crate::error::{DataError, Place};
+use crate::geographic::{frame, middle, on_earth};
 use crate::metadata::Metadata;
-use crate::ndjson::Scans;
-use crate::options::ReadOptions;
 use crate::remarks::Remarks;
-use crate::sheet::{Cells, Sheet};
-use crate::source::text;
-use crate::table::{Detection, Detections, Noise, Observation, Scan};
+use crate::sheet::Sheet;
+use crate::table::{Detection, Detections, Observation, Origin, Scan};
 
 /// The columns of the table.
 pub(crate) fn detection_columns() -> Vec<Column> {
@@ -51,6 +51,11 @@ pub(crate) fn detection_columns() -> Vec<Column> {
 
 impl Layout for Detections {
     const TABLE: &'static str = "detections";
+    const LISTS: bool = true;
+
+    fn foreign_columns() -> Vec<Column> {
+        ["latitude", "longitude"].map(|name| Column::real(name, "rad", Limits::Finite)).to_vec()
+    }
 
     fn columns(_metadata: &Metadata) -> Vec<Column> {
         detection_columns()
@@ -76,51 +81,62 @@ impl Layout for Detections {
         Ok(())
     }
 
-    /// Lines of scans and lines of detections may both be there.
-    fn from_lines(
-        reader: &mut dyn BufRead,
-        file: &Arc<str>,
-        options: &ReadOptions,
+    fn from_sheet(
+        sheet: &Sheet,
+        metadata: Metadata,
+        context: &Context<'_>,
         remarks: &mut Remarks,
     ) -> Result<Self, DataError> {
-        let mut text = text(reader, file)?;
-        let mut lines = Scans::new(text.reader.as_mut(), file, options.clone());
-        let mut scans = Vec::new();
-        let mut ids = HashSet::new();
-        for scan in &mut lines {
-            let scan = scan?;
-            if let Some(twice) = scan.detections.iter().find(|detection| !ids.insert(detection.id)) {
-                return Err(repeated(Place::whole(file), twice.id));
-            }
-            scans.push(scan);
-        }
-        let (origin, description) = (lines.origin(), lines.description());
-        remarks.notes.extend(text.note());
-        Ok(Detections { origin, description, scans })
-    }
-
-    fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError> {
-        let rows = Rows::new(sheet, context);
-        rows.check_columns()?;
-        let mut scans: Vec<Scan> = Vec::new();
-        let mut last = None;
+        let (origin, frame) = local_frame(sheet, &metadata, context, remarks)?;
+        let reader = Rows::new(sheet, context, frame.as_ref());
+        reader.check_columns()?;
+        let mut rows = Vec::with_capacity(sheet.len());
         let mut ids = HashSet::new();
         for row in 0..sheet.len() {
-            let read = rows.read(row, ids.len() as u64)?;
-            if let Some(detection) = &read.detection
-                && !ids.insert(detection.id)
-            {
-                return Err(repeated(sheet.place(context.file, row), detection.id));
+            let place = || sheet.place(context.file, row);
+            let read = reader.read(row, ids.len() as u64).and_then(|read| match &read.detection {
+                Some(detection) if !ids.insert(detection.id) => Err(repeated(place(), detection.id)),
+                _ => Ok(read),
+            });
+            match read {
+                Ok(read) => rows.push((read, row)),
+                Err(error) => remarks.refuse(error)?,
             }
-            let number = read.scan;
-            match scans.last_mut().filter(|scan| read.continues(scan, last)) {
-                Some(scan) => read.join(scan, || sheet.place(context.file, row))?,
-                None => scans.push(read.start()),
-            }
-            last = number;
         }
-        Ok(Detections { origin: metadata.origin, description: metadata.description, scans })
+        let empty = rows.iter().filter(|(row, _)| row.detection.is_none()).count();
+        if empty > 0 && !context.ours {
+            remarks.notes.push(format!(
+                "{empty} of {} rows have no measurement (empty or nan); a scan of such rows alone is one in which nothing was seen",
+                rows.len()
+            ));
+        }
+        let scans = scans(rows, |row| sheet.place(context.file, row), context.options, remarks)?;
+        Ok(Detections { origin, description: metadata.description, scans })
     }
+}
+
+/// The frame of a table whose positions are latitudes and longitudes.
+fn local_frame(
+    sheet: &Sheet,
+    metadata: &Metadata,
+    context: &Context<'_>,
+    remarks: &mut Remarks,
+) -> Result<(Option<Origin>, Option<LocalFrame>), DataError> {
+    let [latitude, longitude] = ["latitude", "longitude"].map(|name| sheet.reals(name));
+    if !latitude.present() || !longitude.present() {
+        return Ok((metadata.origin, None));
+    }
+    let positions = (0..sheet.len()).filter_map(|row| on_earth(latitude.get(row)?, longitude.get(row)?).ok());
+    let said = context.options.origin.or(metadata.origin);
+    let Some(origin) = said.or_else(|| middle(positions)) else { return Ok((None, None)) };
+    if said.is_none() {
+        remarks.notes.push(format!(
+            "the positions are latitudes and longitudes; x and y are east and north of {:.4}, {:.4}",
+            origin.latitude.to_degrees(),
+            origin.longitude.to_degrees()
+        ));
+    }
+    Ok((Some(origin), Some(frame(origin, context.file)?)))
 }
 
 fn fill_row(sheet: &mut Sheet, number: u64, scan: &Scan, detection: Option<&Detection>) {
@@ -158,187 +174,5 @@ fn repeated(place: Place, id: u64) -> DataError {
         place,
         problem: format!("detection {id} is there a second time"),
         help: "number the detections of a recording without repetition, or leave the column out",
-    }
-}
-
-/// One row, read.
-pub(crate) struct DetectionRow {
-    pub time: f64,
-    pub sensor: Arc<str>,
-    /// Number of the scan, when the file numbers them.
-    pub scan: Option<u64>,
-    pub position: Option<[f64; 3]>,
-    pub velocity: Option<[f64; 3]>,
-    /// Nothing in a scan without detections.
-    pub detection: Option<Detection>,
-}
-
-impl DetectionRow {
-    /// True when this row belongs to `scan`, whose number in the file was `number`.
-    pub fn continues(&self, scan: &Scan, number: Option<u64>) -> bool {
-        self.sensor == scan.sensor
-            && match (self.scan, number) {
-                (Some(this), Some(last)) => this == last,
-                (None, None) => self.time == scan.time,
-                _ => false,
-            }
-    }
-
-    /// Adds this row to the scan that it continues. Where the times differ each detection keeps its own, and the scan takes
-    /// the last.
-    pub fn join(mut self, scan: &mut Scan, place: impl FnOnce() -> Place) -> Result<(), DataError> {
-        let problem = if self.position.is_some() && self.position != scan.position {
-            "the sensor is at another place than in the row before, in the same scan".to_owned()
-        } else {
-            if self.time > scan.time {
-                for detection in &mut scan.detections {
-                    detection.time.get_or_insert(scan.time);
-                }
-                scan.time = self.time;
-            } else if self.time < scan.time
-                && let Some(detection) = &mut self.detection
-            {
-                detection.time = Some(self.time);
-            }
-            scan.detections.extend(self.detection);
-            return Ok(());
-        };
-        let help = "a scan has one place: give the rows different numbers in the column `scan`";
-        Err(DataError::Row { place: place(), problem, help })
-    }
-
-    /// The scan that begins with this row.
-    pub fn start(self) -> Scan {
-        let DetectionRow { time, sensor, position, velocity, detection, .. } = self;
-        Scan { time, sensor, position, velocity, detections: detection.into_iter().collect() }
-    }
-}
-
-/// The columns of a sheet of detections.
-pub(crate) struct Rows<'a> {
-    sheet: &'a Sheet,
-    context: &'a Context<'a>,
-    time: Cells<'a, f64>,
-    sensor: Cells<'a, Arc<str>>,
-    scan: Cells<'a, u64>,
-    id: Cells<'a, u64>,
-    /// The file has a column of detection numbers, so that every measurement has one.
-    numbered: bool,
-    xyz: [Cells<'a, f64>; 3],
-    polar: [Cells<'a, f64>; 3],
-    noise: [Cells<'a, f64>; 6],
-    position: Group<'a, 2>,
-    height: Cells<'a, f64>,
-    velocity: Group<'a, 2>,
-    climb: Cells<'a, f64>,
-    identity: Cells<'a, Arc<str>>,
-    truth: Cells<'a, Arc<str>>,
-}
-
-impl<'a> Rows<'a> {
-    pub fn new(sheet: &'a Sheet, context: &'a Context<'a>) -> Self {
-        let sigmas = ["sigma_x", "sigma_y", "sigma_z", "sigma_range", "sigma_bearing", "sigma_range_rate"];
-        Rows {
-            sheet,
-            context,
-            time: sheet.reals("time"),
-            sensor: sheet.texts("sensor"),
-            scan: sheet.counts("scan"),
-            id: sheet.counts("detection"),
-            numbered: sheet.counts("detection").present(),
-            xyz: ["x", "y", "z"].map(|name| sheet.reals(name)),
-            polar: ["range", "bearing", "range_rate"].map(|name| sheet.reals(name)),
-            noise: sigmas.map(|name| sheet.reals(name)),
-            position: Group::new(sheet, ["sensor_x", "sensor_y"]),
-            height: sheet.reals("sensor_z"),
-            velocity: Group::new(sheet, ["sensor_vx", "sensor_vy"]),
-            climb: sheet.reals("sensor_vz"),
-            identity: sheet.texts("identity"),
-            truth: sheet.texts("truth"),
-        }
-    }
-
-    /// One line of a stream, in which only the cells say what is there.
-    pub fn of_line(sheet: &'a Sheet, context: &'a Context<'a>) -> Self {
-        Rows { numbered: false, ..Rows::new(sheet, context) }
-    }
-
-    /// A table must be able to say where something was seen.
-    fn check_columns(&self) -> Result<(), DataError> {
-        let [x, y, _] = &self.xyz;
-        if self.polar[1].present() || (x.present() && y.present()) {
-            return Ok(());
-        }
-        let missing: &[&str] = if x.present() || y.present() {
-            if x.present() { &["y"] } else { &["x"] }
-        } else if self.polar[0].present() {
-            &["bearing"]
-        } else {
-            &["x", "y"]
-        };
-        Err(missing_columns(self.context.file, missing, self.context.found))
-    }
-
-    /// Reads one row; a detection without a number gets `next`.
-    pub fn read(&self, row: usize, next: u64) -> Result<DetectionRow, DataError> {
-        let place = || self.sheet.place(self.context.file, row);
-        let wrong =
-            |problem: &str, help| DataError::Row { place: place(), problem: problem.to_owned(), help };
-        let observation = self.observation(row).map_err(|(problem, help)| wrong(problem, help))?;
-        let id = match (self.id.get(row), observation) {
-            (Some(_), None) => {
-                return Err(wrong("the detection has no measurement", "give x and y, or a bearing"));
-            }
-            (None, Some(_)) if self.numbered => {
-                let help = "number all detections of the file, or leave the column `detection` out";
-                return Err(wrong("the measurement has no detection number", help));
-            }
-            (id, _) => id.unwrap_or(next),
-        };
-        let [x, y, z, range, bearing, range_rate] = self.noise.map(|cells| cells.get(row));
-        let noise = Noise { x, y, z, range, bearing, range_rate };
-        let position = self.position.get(row, place)?;
-        let velocity = self.velocity.get(row, place)?;
-        Ok(DetectionRow {
-            time: self.time.get(row).unwrap_or_default(),
-            sensor: self.sensor(row)?,
-            scan: self.scan.get(row),
-            position: position.map(|[x, y]| [x, y, self.height.get(row).unwrap_or(0.0)]),
-            velocity: velocity.map(|[x, y]| [x, y, self.climb.get(row).unwrap_or(0.0)]),
-            detection: observation.map(|observation| Detection {
-                id,
-                time: None,
-                observation,
-                noise,
-                identity: self.identity.get(row),
-                truth: self.truth.get(row),
-            }),
-        })
-    }
-
-    fn sensor(&self, row: usize) -> Result<Arc<str>, DataError> {
-        self.sensor.get(row).or_else(|| self.context.options.sensor.clone()).ok_or_else(|| {
-            crate::error::Refusal::new("empty", "a name")
-                .helped("fill the cell, or name the one sensor: --sensor NAME")
-                .at(self.sheet.place(self.context.file, row), "sensor")
-        })
-    }
-
-    /// What was measured in a row, if anything; otherwise what is wrong, and what helps.
-    fn observation(&self, row: usize) -> Result<Option<Observation>, (&'static str, &'static str)> {
-        let [x, y, z] = self.xyz.map(|cells| cells.get(row));
-        let [range, bearing, range_rate] = self.polar.map(|cells| cells.get(row));
-        let position = x.is_some() || y.is_some() || z.is_some();
-        let polar = range.is_some() || bearing.is_some() || range_rate.is_some();
-        match (x, y, bearing) {
-            _ if position && polar => {
-                Err(("both a position and polar components are given", "give what the sensor measures"))
-            }
-            (Some(x), Some(y), _) => Ok(Some(Observation::Position { x, y, z })),
-            _ if position => Err(("a position needs both x and y", "fill the other cell")),
-            (_, _, Some(bearing)) => Ok(Some(Observation::Polar { range, bearing, range_rate })),
-            _ if polar => Err(("a range or range rate needs a bearing", "fill the column `bearing`")),
-            _ => Ok(None),
-        }
     }
 }

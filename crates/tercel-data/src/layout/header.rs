@@ -5,48 +5,38 @@ use std::sync::Arc;
 
 use crate::column::Column;
 use crate::error::{DataError, Place};
+use crate::names::{Choice, Naming};
 
-/// For each column that the file has, where it stands there.
-///
-/// Columns of the file that are not known are left out, unless their name is so near to a missing one that it
-/// looks like a slip of the pen.
-pub(crate) fn match_header(
+/// Refuses a file in which columns are missing, or have names that are almost known.
+pub(crate) fn check_names(
+    naming: &Naming,
+    choice: &Choice,
     found: &[String],
-    columns: Vec<Column>,
     file: &Arc<str>,
-) -> Result<Vec<(usize, Column)>, DataError> {
-    let mut seen = HashSet::new();
-    if let Some(twice) = found.iter().find(|name| !seen.insert(name.as_str())) {
-        return Err(DataError::Column {
-            place: Place::whole(file),
-            column: twice.clone(),
-            problem: "is there twice",
-            help: "rename or remove one of them".to_owned(),
-        });
-    }
-    let known: HashSet<&str> = columns.iter().map(|column| column.name.as_ref()).collect();
-    let strangers: Vec<&str> =
-        found.iter().map(String::as_str).filter(|name| !known.contains(name)).collect();
-    let absent = |column: &&Column| !seen.contains(column.name.as_ref());
-    let missing: Vec<&str> = columns
-        .iter()
-        .filter(absent)
-        .filter(|column| column.needed)
-        .map(|column| column.name.as_ref())
-        .collect();
+) -> Result<(), DataError> {
+    let present: HashSet<usize> = choice.used.iter().map(|(_, meaning)| meaning.column).collect();
+    let absent = || {
+        naming.columns().iter().enumerate().filter(|(at, _)| !present.contains(at)).map(|(_, column)| column)
+    };
+    let missing: Vec<&str> =
+        absent().filter(|column| column.needed).map(|column| column.name.as_ref()).collect();
     if !missing.is_empty() {
-        return Err(missing_columns(file, &missing, found));
+        return Err(missing_columns(&Place::whole(file), &missing, found));
     }
-    let absent: Vec<Column> = columns.iter().filter(absent).cloned().collect();
-    if let Some(slip) =
-        strangers.iter().find_map(|stranger| near_miss(stranger, &absent, || Place::whole(file)))
-    {
-        return Err(slip);
-    }
-    Ok(columns
+    // Names that mean something else are no slips.
+    let strangers = choice.unused.iter().filter(|name| matches!(naming.meaning(name), Ok(None)));
+    let absent: Vec<Column> = absent()
+        .filter(|column| !["latitude", "longitude"].contains(&column.name.as_ref()))
+        .cloned()
+        .collect();
+    match strangers
         .into_iter()
-        .filter_map(|column| found.iter().position(|name| *name == column.name).map(|at| (at, column)))
-        .collect())
+        .filter(|name| !naming.ignores(name))
+        .find_map(|stranger| near_miss(stranger, &absent, || Place::whole(file)))
+    {
+        Some(slip) => Err(slip),
+        None => Ok(()),
+    }
 }
 
 /// The error for a column that is not known but almost one of these, if it is.
@@ -60,28 +50,30 @@ pub(crate) fn near_miss(
         place: place(),
         column: stranger.to_owned(),
         problem: "is not known",
-        help: format!("did you mean `{}`?", meant.name),
+        help: format!(
+            "did you mean `{0}`? --column {0}={stranger} says so, --ignore {stranger} that it is something else",
+            meant.name
+        ),
     })
 }
 
 /// The error for columns that are not there, with the found ones that come nearest.
-pub(crate) fn missing_columns(file: &Arc<str>, missing: &[&str], found: &[String]) -> DataError {
+pub(crate) fn missing_columns(place: &Place, missing: &[&str], found: &[String]) -> DataError {
     let candidates: Vec<&str> = found.iter().map(String::as_str).collect();
     let renames: Vec<String> = missing
         .iter()
-        .filter_map(|name| nearest(name, &candidates).map(|near| format!("rename `{near}` to `{name}`")))
+        .filter_map(|name| {
+            nearest(name, &candidates).map(|near| format!("--column {name}={near} if `{near}` is meant"))
+        })
         .collect();
     let help = if !renames.is_empty() {
         renames.join(", ")
-    } else if found.len() == 1 && found[0].contains([';', '\t']) {
-        "separate the columns by commas".to_owned()
-    } else if missing.contains(&"sensor") {
-        "add the column, or name the one sensor: --sensor NAME".to_owned()
     } else {
-        "add the column, or rename the one that holds it".to_owned()
+        let name = missing.first().copied().unwrap_or("time");
+        format!("say which columns hold them: --column {name}=NAME")
     };
     DataError::MissingColumns {
-        file: Arc::clone(file),
+        place: place.clone(),
         missing: missing.iter().map(|&name| name.to_owned()).collect(),
         found: found.to_vec(),
         help,

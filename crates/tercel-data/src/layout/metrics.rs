@@ -6,6 +6,7 @@ use super::{Context, Layout};
 use crate::column::{Column, Limits};
 use crate::error::DataError;
 use crate::metadata::Metadata;
+use crate::remarks::Remarks;
 use crate::sheet::Sheet;
 use crate::table::{Metric, Metrics};
 
@@ -36,7 +37,12 @@ impl Layout for Metrics {
         Ok(())
     }
 
-    fn from_sheet(sheet: &Sheet, _metadata: Metadata, _context: &Context<'_>) -> Result<Self, DataError> {
+    fn from_sheet(
+        sheet: &Sheet,
+        _metadata: Metadata,
+        _context: &Context<'_>,
+        _remarks: &mut Remarks,
+    ) -> Result<Self, DataError> {
         let texts = ["study", "method", "run", "metric", "component"].map(|name| sheet.texts(name));
         let value = sheet.reals("value");
         let rows = (0..sheet.len())

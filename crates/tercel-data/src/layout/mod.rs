@@ -3,23 +3,23 @@
 mod detections;
 mod header;
 mod metrics;
+mod rows;
+mod scans;
 mod tracks;
 mod truths;
 
-use std::io::BufRead;
 use std::sync::Arc;
 
 use crate::column::Column;
 use crate::error::{DataError, Place};
-use crate::format::{Content, json};
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
 use crate::remarks::Remarks;
 use crate::sheet::{Cells, Sheet};
-use crate::source::text;
 
-pub(crate) use detections::{DetectionRow, Rows, detection_columns};
-pub(crate) use header::{match_header, near_miss};
+pub(crate) use detections::detection_columns;
+pub(crate) use header::{check_names, missing_columns, near_miss};
+pub(crate) use rows::{DetectionRow, Rows};
 pub(crate) use tracks::{fill_tracks, track_columns};
 
 /// A table that can lie in columns.
@@ -41,21 +41,26 @@ pub(crate) trait Layout: Sized {
     /// Appends the rows of this table to a sheet of [`Layout::columns`]. Row numbers in errors count from 0.
     fn fill(&self, sheet: &mut Sheet, file: &Arc<str>) -> Result<(), DataError>;
 
-    /// The table of a stream of JSON lines.
-    fn from_lines(
-        reader: &mut dyn BufRead,
-        file: &Arc<str>,
-        options: &ReadOptions,
-        remarks: &mut Remarks,
-    ) -> Result<Self, DataError> {
-        let mut text = text(reader, file)?;
-        let Content { sheet, metadata, found } = json::read::<Self>(text.reader.as_mut(), file, options)?;
-        remarks.notes.extend(text.note());
-        Self::from_sheet(&sheet, metadata, &Context { file, options, found: &found })
+    /// Lines of JSON may hold several rows in a list.
+    const LISTS: bool = false;
+
+    /// A description with all columns that are known by name.
+    fn widest() -> Metadata {
+        Metadata::new(Self::TABLE, None)
+    }
+
+    /// Columns that files of other programs may have in place of ours.
+    fn foreign_columns() -> Vec<Column> {
+        Vec::new()
     }
 
     /// The table of a sheet whose cells are already right one by one.
-    fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError>;
+    fn from_sheet(
+        sheet: &Sheet,
+        metadata: Metadata,
+        context: &Context<'_>,
+        remarks: &mut Remarks,
+    ) -> Result<Self, DataError>;
 }
 
 /// What a layout must know about the file that it reads.
@@ -64,6 +69,10 @@ pub(crate) struct Context<'a> {
     pub options: &'a ReadOptions,
     /// Names of all columns of the file, the unknown ones too.
     pub found: &'a [String],
+    /// The file is one of our own.
+    pub ours: bool,
+    /// Rows are objects, each of which says what it has.
+    pub keyed: bool,
 }
 
 /// Numbers that are in a row all together or not at all.

@@ -6,6 +6,7 @@ use super::{Context, EXTENT, Group, Layout, extent_columns};
 use crate::column::{Column, Kind, Limits};
 use crate::error::{DataError, Place, Refusal};
 use crate::metadata::Metadata;
+use crate::remarks::Remarks;
 use crate::sheet::{Cells, Sheet};
 use crate::table::{Status, Track, Tracks};
 
@@ -110,6 +111,11 @@ impl Layout for Tracks {
         track_columns(&metadata.labels, &metadata.modes)
     }
 
+    fn widest() -> Metadata {
+        let labels = COMPONENTS.iter().map(|(name, _)| (*name).to_owned()).collect();
+        Metadata { labels, ..Metadata::new(Self::TABLE, None) }
+    }
+
     /// Without a description the state is made of the components that are known by name.
     fn guess(found: &[String]) -> Metadata {
         let known = |name: &str| found.iter().any(|column| column == name);
@@ -137,10 +143,21 @@ impl Layout for Tracks {
         fill_tracks(sheet, &self.rows, &self.labels, &self.modes, file)
     }
 
-    fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError> {
+    fn from_sheet(
+        sheet: &Sheet,
+        metadata: Metadata,
+        context: &Context<'_>,
+        remarks: &mut Remarks,
+    ) -> Result<Self, DataError> {
         let Metadata { labels, modes, origin, .. } = metadata;
         let reader = Reader::new(sheet, &labels, &modes, context);
-        let rows = (0..sheet.len()).map(|row| reader.read(row)).collect::<Result<_, _>>()?;
+        let mut rows = Vec::with_capacity(sheet.len());
+        for row in 0..sheet.len() {
+            match reader.read(row) {
+                Ok(track) => rows.push(track),
+                Err(error) => remarks.refuse(error)?,
+            }
+        }
         Ok(Tracks { origin, labels, modes, rows })
     }
 }

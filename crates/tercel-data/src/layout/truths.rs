@@ -6,6 +6,7 @@ use super::{Context, EXTENT, Group, Layout, extent_columns};
 use crate::column::{Column, Limits};
 use crate::error::DataError;
 use crate::metadata::Metadata;
+use crate::remarks::Remarks;
 use crate::sheet::Sheet;
 use crate::table::{Truth, Truths};
 
@@ -46,7 +47,12 @@ impl Layout for Truths {
         Ok(())
     }
 
-    fn from_sheet(sheet: &Sheet, metadata: Metadata, context: &Context<'_>) -> Result<Self, DataError> {
+    fn from_sheet(
+        sheet: &Sheet,
+        metadata: Metadata,
+        context: &Context<'_>,
+        remarks: &mut Remarks,
+    ) -> Result<Self, DataError> {
         let [time, x, y, z] = ["time", "x", "y", "z"].map(|name| sheet.reals(name));
         let object = sheet.texts("object");
         let velocity = Group::new(sheet, ["vx", "vy"]);
@@ -54,13 +60,21 @@ impl Layout for Truths {
         let mut rows = Vec::with_capacity(sheet.len());
         for row in 0..sheet.len() {
             let place = || sheet.place(context.file, row);
+            let parts = velocity.get(row, place).and_then(|velocity| Ok((velocity, extent.get(row, place)?)));
+            let (velocity, extent) = match parts {
+                Ok(parts) => parts,
+                Err(error) => {
+                    remarks.refuse(error)?;
+                    continue;
+                }
+            };
             rows.push(Truth {
                 time: time.get(row).unwrap_or_default(),
                 object: object.get(row).unwrap_or_default(),
                 position: [x.get(row).unwrap_or_default(), y.get(row).unwrap_or_default()],
                 z: z.get(row),
-                velocity: velocity.get(row, place)?,
-                extent: extent.get(row, place)?,
+                velocity,
+                extent,
             });
         }
         Ok(Truths { origin: metadata.origin, rows })

@@ -60,7 +60,7 @@ impl Kind {
         if start.get(257..262) == Some(b"ustar") {
             return Kind::Other("a tar archive");
         }
-        let text = start.trim_ascii_start();
+        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start).trim_ascii_start();
         let begins =
             |word: &[u8]| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word));
         if begins(b"<!doctype html") || begins(b"<html") {

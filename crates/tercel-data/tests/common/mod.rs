@@ -72,6 +72,7 @@ fn scan() -> impl Strategy<Value = Scan> {
 
 pub fn detections() -> impl Strategy<Value = Detections> {
     (origin(), vec(scan(), 0..6), any::<u32>(), 1..1000_u64).prop_map(|(origin, mut scans, first, step)| {
+        scans.sort_by(|one, next| one.time.total_cmp(&next.time));
         let detections = scans.iter_mut().flat_map(|scan| &mut scan.detections);
         detections.enumerate().for_each(|(i, detection)| detection.id = u64::from(first) + i as u64 * step);
         Detections { origin, scans, description: Description::default() }

@@ -9,12 +9,14 @@ use std::io::BufRead;
 use std::sync::Arc;
 
 use super::{Content, Plan};
-use crate::error::{DataError, Place};
+use crate::error::{DataError, Place, Refusal, Spot};
 use crate::layout::Layout;
 use crate::metadata::Metadata;
 use crate::options::ReadOptions;
 use crate::remarks::Remarks;
+use crate::sheet::Sheet;
 
+use record::Record;
 pub(crate) use rows::Rows;
 pub(crate) use writer::Writer;
 
@@ -34,18 +36,31 @@ pub(crate) fn read<T: Layout>(
     // Files of other programs often have blanks after their commas; in our own every blank belongs to a name.
     let trim = described.is_none();
     let found = rows.named(file)?.to_vec();
-    let plan = Plan::new::<T>(&found, described, file, options)?;
+    let plan = Plan::new::<T>(&found, described, file, options, remarks)?;
     let mut sheet = plan.sheet();
-    while let Some((record, line)) = rows.next(file)? {
-        for ((at, column), values) in plan.columns.iter().zip(&mut sheet.values) {
-            let text = record.get(*at).unwrap_or_default();
-            let text = if trim { text.trim() } else { text };
-            values
-                .push_text(text, column, options.angles)
-                .map_err(|refusal| refusal.at(Place::line(file, line), &column.name))?;
+    loop {
+        let pushed = match rows.next(file) {
+            Ok(None) => break,
+            Ok(Some((record, line))) => push(&mut sheet, &plan, record, trim)
+                .map(|()| sheet.spots.push(Spot::Line(line)))
+                .map_err(|(at, refusal)| refusal.at(Place::line(file, line), &found[plan.columns[at].at])),
+            Err(error) => Err(error),
+        };
+        if let Err(error) = pushed {
+            sheet.truncate(sheet.spots.len());
+            remarks.refuse(error)?;
         }
-        sheet.lines.push(line);
     }
     remarks.notes.extend(rows.notes());
-    Ok(Content { sheet, metadata: plan.metadata, found })
+    Ok(Content { sheet, metadata: plan.metadata, found, time_unit: plan.time_unit, ours: plan.ours })
+}
+
+/// Appends a row, or says which of the columns refuses, and why.
+fn push(sheet: &mut Sheet, plan: &Plan, record: &Record, trim: bool) -> Result<(), (usize, Refusal)> {
+    for (at, (source, values)) in plan.columns.iter().zip(&mut sheet.values).enumerate() {
+        let text = record.get(source.at).unwrap_or_default();
+        let text = if trim { text.trim() } else { text };
+        values.push_text(text, &source.column, source.conversion).map_err(|refusal| (at, refusal))?;
+    }
+    Ok(())
 }

@@ -7,7 +7,7 @@ use super::PREFIX;
 use super::dialect::{Delimiter, is_value};
 use super::record::{Record, Split};
 use crate::error::{DataError, Place};
-use crate::source::{Text, read_error, text};
+use crate::source::{Kind, Text, read_error, text};
 
 /// Lines that are looked at to tell the dialect.
 const SAMPLE: usize = 32;
@@ -37,10 +37,15 @@ pub(crate) struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// Looks at the first lines. `columns` are names for a file without header.
     pub fn new(
-        reader: impl std::io::BufRead + 'a,
+        mut reader: impl std::io::BufRead + 'a,
         file: &Arc<str>,
         columns: Option<&[String]>,
     ) -> Result<Self, DataError> {
+        let start = reader.fill_buf().map_err(|error| read_error(file, error))?;
+        if Kind::of(start) == Kind::Json {
+            let help = "name the format: --from ndjson";
+            return Err(DataError::unsettled(Place::whole(file), "this is JSON, not a table of cells", help));
+        }
         let mut rows = Rows {
             header: Vec::new(),
             described: None,

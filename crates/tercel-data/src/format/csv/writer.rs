@@ -43,6 +43,8 @@ impl<W: Write> Writer<W> {
                 cells[row].map_or(Ok(()), |number| write_number(number, &mut self.cell))?
             }
             Values::Count(cells) => cells[row].map_or(Ok(()), |number| write!(self.cell, "{number}"))?,
+            // Tables of ours hold seconds.
+            Values::Time(_) => {}
             Values::Text(cells) => self.cell.extend(cells[row].iter().flat_map(|text| text.bytes())),
         }
         self.writer.write_field(&self.cell)

@@ -136,7 +136,7 @@ impl Aircraft {
             let missing = needed.iter().filter(|(_, field)| !field.present());
             return Err(table.missing(&missing.map(|(names, _)| *names).collect::<Vec<_>>()));
         }
-        let clock = input.clock(|| clock::settle(open()?, &TIME, options.date_order))?;
+        let clock = input.clock(|| clock::settle(open()?, &TIME, &options.read))?;
         let (altitude, note) = altitude::settle(open()?)?;
         let aircraft = field(&AIRCRAFT);
         Ok(Aircraft {
@@ -183,7 +183,7 @@ impl Aircraft {
     }
 
     /// The time of the position, where it is known.
-    fn position_time(&self, reported: f64) -> Result<Option<f64>, DataError> {
+    fn position_time(&mut self, reported: f64) -> Result<Option<f64>, DataError> {
         match self.clock.time(&self.table, &self.position_time)? {
             Some(time) => Ok(Some(time)),
             None => Ok(self.table.number(&self.age)?.map(|age| reported - age)),

@@ -1,6 +1,6 @@
 //! The parts of a sentence, and of what receivers and loggers put around it.
 
-use super::super::time::{Moment, seconds};
+use crate::time::Moment;
 
 /// A sentence whose checksum is right.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,10 +79,12 @@ fn time_after(after: &str) -> Option<f64> {
 /// A time of receipt. Smaller numbers are counters and signal strengths.
 fn moment(text: &str) -> Option<f64> {
     const EARLIEST: f64 = 3e8;
-    match Moment::read(text)? {
-        Moment::Number(number) => Some(seconds(number)).filter(|time| *time > EARLIEST),
-        Moment::Date(time) => Some(time),
-        Moment::Either { .. } => None,
+    match Moment::parse(text)? {
+        Moment::Number(number) => {
+            Some(if number < 1e11 { number } else { number / 1e3 }).filter(|time| *time > EARLIEST)
+        }
+        Moment::Instant(time) | Moment::Civil(time) => Some(time),
+        Moment::Slashed { .. } | Moment::OfDay(_) => None,
     }
 }
 

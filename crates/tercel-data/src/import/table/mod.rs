@@ -121,7 +121,7 @@ impl Table {
     pub fn missing(&self, names: &[&Names]) -> DataError {
         let missing = names.iter().map(|names| names.usual().join("` or `")).collect();
         DataError::MissingColumns {
-            file: Arc::clone(&self.file),
+            place: self.whole(),
             missing,
             found: self.rows.names().to_vec(),
             help: "rename the column that holds it, or choose another source: --from".to_owned(),

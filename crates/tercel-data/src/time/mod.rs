@@ -1,0 +1,9 @@
+//! Times as files have them: numbers in some unit, dates in some form and zone, times of day.
+
+mod clock;
+mod moment;
+mod unit;
+mod zone;
+
+pub(crate) use clock::{Clock, Times};
+pub(crate) use moment::Moment;
