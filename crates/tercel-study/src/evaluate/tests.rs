@@ -5,8 +5,12 @@ use tercel_data::table::{Track, Truth};
 
 use super::*;
 
-fn tracks(rows: impl IntoIterator<Item = (f64, u64, [f64; 2])>) -> Tracks {
-    let row = |(time, track, [x, y]): (f64, u64, [f64; 2])| Track {
+/// Time, number and place of a row of the tracks, and of the truth.
+type Told = (f64, u64, [f64; 2]);
+type Known = (f64, usize, [f64; 2]);
+
+fn tracks(rows: impl IntoIterator<Item = Told>) -> Tracks {
+    let row = |(time, track, [x, y]): Told| Track {
         time,
         sensor: "radar".into(),
         track,
@@ -22,8 +26,8 @@ fn tracks(rows: impl IntoIterator<Item = (f64, u64, [f64; 2])>) -> Tracks {
     Tracks { labels: vec!["x".into(), "y".into()], rows, ..Tracks::default() }
 }
 
-fn truths(rows: impl IntoIterator<Item = (f64, usize, [f64; 2])>) -> Truths {
-    let row = |(time, object, position): (f64, usize, [f64; 2])| Truth {
+fn truths(rows: impl IntoIterator<Item = Known>) -> Truths {
+    let row = |(time, object, position): Known| Truth {
         time,
         object: format!("object {object:04}").into(),
         position,
@@ -35,12 +39,12 @@ fn truths(rows: impl IntoIterator<Item = (f64, usize, [f64; 2])>) -> Truths {
 }
 
 /// An object that goes east, 10 m each second.
-fn east(times: impl IntoIterator<Item = f64>) -> Vec<(f64, usize, [f64; 2])> {
+fn east(times: impl IntoIterator<Item = f64>) -> Vec<Known> {
     times.into_iter().map(|time| (time, 0, [10.0 * time, 0.0])).collect()
 }
 
 /// A track of it that is `off` metres aside.
-fn follow(times: impl IntoIterator<Item = f64>, off: f64) -> Vec<(f64, u64, [f64; 2])> {
+fn follow(times: impl IntoIterator<Item = f64>, off: f64) -> Vec<Told> {
     times.into_iter().map(|time| (time, 1, [10.0 * time, off])).collect()
 }
 
@@ -48,7 +52,7 @@ fn seconds(from: u32, to: u32) -> impl Iterator<Item = f64> + Clone {
     (from..=to).map(f64::from)
 }
 
-fn score(tracks: Vec<(f64, u64, [f64; 2])>, truths_rows: Vec<(f64, usize, [f64; 2])>) -> Evaluation {
+fn score(tracks: Vec<Told>, truths_rows: Vec<Known>) -> Evaluation {
     evaluate(&self::tracks(tracks), &truths(truths_rows), &EvaluateOptions::default()).unwrap()
 }
 
@@ -233,7 +237,7 @@ impl Plain {
 }
 
 /// Objects on a walk over a small place, and tracks that follow them, break, and go astray: of each some rows.
-fn scene() -> impl Strategy<Value = (Vec<(f64, usize, [f64; 2])>, Vec<(f64, u64, [f64; 2])>)> {
+fn scene() -> impl Strategy<Value = (Vec<Known>, Vec<Told>)> {
     let walk = prop::collection::vec((0.0..60.0f64, 0.0..60.0f64, 0u8..4), 25);
     let set = prop::collection::vec((walk, 0usize..15, 5usize..25), 0..6);
     (set.clone(), set).prop_map(|(objects, strangers)| {
@@ -326,8 +330,8 @@ proptest! {
             prop_assert_eq!((instant.covered, instant.switches), (expected.covered, expected.switches));
             prop_assert_eq!(instant.false_tracks, expected.false_tracks);
             prop_assert_eq!(instant.false_tracks_near, expected.false_tracks_near);
-            for figure in [|one: &Instant| one.gospa, |one| one.gospa_near, |one| one.ospa] {
-                let (found, expected) = (figure(instant), figure(&expected));
+            let figures = |one: &Instant| [one.gospa, one.gospa_near, one.ospa];
+            for (found, expected) in figures(instant).into_iter().zip(figures(&expected)) {
                 prop_assert!((found - expected).abs() < 1e-9, "{} instead of {}", found, expected);
             }
             squares.extend(found.iter().map(|distance| distance * distance));
