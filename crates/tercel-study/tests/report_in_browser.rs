@@ -317,3 +317,19 @@ fn twenty_thousand_detections_and_three_hundred_tracks_follow_the_slider() {
     // On an idle machine it is a tenth of that; as elements of a drawing they would take longer.
     assert!(took.as_f64().unwrap() < 1000.0, "{took} ms");
 }
+
+#[test]
+fn a_long_recording_opens_says_what_it_leaves_out_and_plays_to_the_end() {
+    let scene = scene::scene(&scene::Size { boats: 10, scans: 11_000, clutter: 40 });
+    let Some(mut browser) = browse(&scene::report("Long", &scene).unwrap()) else { return };
+    let notes = "[...document.querySelectorAll('.note')].map((note) => note.textContent).join(' ')";
+    let notes = browser.value(notes).as_str().unwrap().to_owned();
+    for part in ["detections is drawn", "The slider stops at one in 2 of 22000 times"] {
+        assert!(notes.contains(part), "{part} is missing in {notes}");
+    }
+    assert!(number(&mut browser, "ink()") > 2000.0);
+    browser.value("slide(Number(slider().max) - 40)");
+    browser.value("document.querySelector('.play').click()");
+    browser.wait("slider().value === slider().max");
+    assert_eq!(browser.complaints(), [""; 0]);
+}
