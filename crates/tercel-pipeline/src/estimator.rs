@@ -213,6 +213,10 @@ impl<const K: usize, const N: usize, const M: usize> Sensor<K, M> for Shortened<
         self.sensor.region(expected, half)
     }
 
+    fn site(&self) -> Option<Vector2<f64>> {
+        self.sensor.site()
+    }
+
     fn axes(&self) -> usize {
         self.sensor.axes()
     }

@@ -28,6 +28,12 @@ impl Region {
         Region { centre: self.centre, low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
     }
 
+    /// The whole plane, with the same centre.
+    pub(crate) fn boundless(&self) -> Region {
+        let far = Vector2::repeat(f64::INFINITY);
+        Region { centre: self.centre, low: -far, high: far }
+    }
+
     /// The region that holds those of all parts of a mixture, with the weighted mean of their centres. None where one has none,
     /// or where there is no part.
     pub(crate) fn mixture(mut parts: impl Iterator<Item = Option<(f64, Region)>>) -> Option<Region> {
@@ -125,6 +131,16 @@ impl Search {
     /// Largest normalised innovation squared of readings of `dof` components.
     pub fn limit(&self, dof: usize) -> f64 {
         self.gate.limit(dof)
+    }
+
+    /// The least age of a measurement, s.
+    pub(crate) fn youngest(&self) -> f64 {
+        self.youngest
+    }
+
+    /// The largest age of a measurement, s.
+    pub(crate) fn oldest(&self) -> f64 {
+        self.oldest
     }
 
     /// Ages at which an object is to be looked for, s.

@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 use std::ops::AddAssign;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SVector, Vector2};
 
 use crate::association::{Region, Search};
 use crate::belief::{Gaussian, positive};
@@ -46,11 +46,12 @@ pub(super) use gaussian_belief;
 
 /// The region in which a gate may take measurements: `innovation` gives the expected reading of a belief, and the variances of a
 /// measurement's difference from it. Every component of a reading inside the gate differs by at most the root of the gate's
-/// limit times its variance.
+/// limit times its variance. `mean` says how the object moves past the sensor while measurements of different ages are taken.
 #[inline]
 pub(super) fn searched<const N: usize, const M: usize, S: Sensor<N, M>>(
     sensor: &S,
     search: &Search,
+    mean: &SVector<f64, N>,
     innovation: impl Fn(&Aged<'_, S>, &Measurement<M>) -> Result<(SVector<f64, M>, SVector<f64, M>), FilterError>,
 ) -> Option<Region> {
     // More than rounding of the gate's own comparison, where the innovation covariance is ill-conditioned.
@@ -70,7 +71,29 @@ pub(super) fn searched<const N: usize, const M: usize, S: Sensor<N, M>>(
         let all = found.map_or(here, |(all, last)| all.and(&here.stretched_from(&last)));
         found = Some((all, here));
     }
-    found.map(|(all, _)| all)
+    let (all, _) = found?;
+    Some(if passes_by(sensor, search, mean) { all.boundless() } else { all })
+}
+
+/// Whether an object moves so near past the sensor within the ages of a search that it is seen from other sides between
+/// them: then the ages that are looked at say little of the others.
+fn passes_by<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    search: &Search,
+    mean: &SVector<f64, N>,
+) -> bool {
+    let Some(site) = sensor.site().filter(|_| N >= 2 && search.oldest() > search.youngest()) else {
+        return false;
+    };
+    let from_site = |age: f64| {
+        let seen = Aged::new(sensor, age).seen(mean);
+        Vector2::new(seen[0] - site.x, seen[1] - site.y)
+    };
+    let (start, way) =
+        (from_site(search.youngest()), from_site(search.oldest()) - from_site(search.youngest()));
+    let square = way.norm_squared();
+    let nearest = if square > 0.0 { (-start.dot(&way) / square).clamp(0.0, 1.0) } else { 0.0 };
+    (start + way * nearest).norm() < 2.0 * way.norm()
 }
 
 /// The reach of a Gaussian belief whose readings are compared to first order.
@@ -80,7 +103,7 @@ pub(super) fn linear_reach<const N: usize, const M: usize>(
     belief: &Gaussian<N>,
     search: &Search,
 ) -> Option<Region> {
-    searched(sensor, search, |sensor, probe| {
+    searched(sensor, search, &belief.mean, |sensor, probe| {
         let expected = sensor.expected(&belief.mean);
         let jacobian = sensor.jacobian(&belief.mean);
         let spread = jacobian * sensor.project(&belief.covariance, &jacobian);
@@ -93,7 +116,7 @@ pub(super) fn linear_reach<const N: usize, const M: usize>(
 pub(super) fn moments<const N: usize, G: Borrow<Gaussian<N>>>(
     parts: impl Iterator<Item = (f64, G)> + Clone,
 ) -> Gaussian<N> {
-    let mut merged = Gaussian { mean: SVector::zeros(), covariance: SMatrix::zeros() };
+    let mut merged = Gaussian { mean: SVector::zeros(), covariance: nalgebra::SMatrix::zeros() };
     // Relative to the first mean: positions may be large against what lies between them.
     let Some(start) = parts.clone().next().map(|(_, part)| part.borrow().mean) else { return merged };
     let mut total = 0.0;

@@ -133,7 +133,7 @@ where
 
     fn reach(&self, belief: &Gaussian<N>, search: &Search) -> Option<Region> {
         let points = self.points.draw(belief);
-        searched(&self.sensor, search, |sensor, probe| {
+        searched(&self.sensor, search, &belief.mean, |sensor, probe| {
             let image = readings(sensor, &self.points, &points);
             let noise = sensor.read(probe, Some(&image.mean))?.noise;
             Ok((image.mean, (image.covariance() + noise).diagonal()))

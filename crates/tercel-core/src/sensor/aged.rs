@@ -47,7 +47,7 @@ impl<'a, S: ?Sized> Aged<'a, S> {
     /// The state that the sensor saw.
     // Out of line, so that the common case stays small.
     #[cold]
-    fn seen<const N: usize, const M: usize>(&self, state: &SVector<f64, N>) -> SVector<f64, N>
+    pub(crate) fn seen<const N: usize, const M: usize>(&self, state: &SVector<f64, N>) -> SVector<f64, N>
     where
         S: Sensor<N, M>,
     {
@@ -128,6 +128,10 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
 
     fn axes(&self) -> usize {
         self.sensor.axes()
+    }
+
+    fn site(&self) -> Option<Vector2<f64>> {
+        self.sensor.site()
     }
 
     fn area(&self, measurement: &Measurement<M>) -> f64 {

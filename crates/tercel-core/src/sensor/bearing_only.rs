@@ -99,6 +99,10 @@ impl<const N: usize> Sensor<N, 1> for BearingOnly {
         None
     }
 
+    fn site(&self) -> Option<Vector2<f64>> {
+        Some(self.position)
+    }
+
     fn region(&self, _: &Vector1<f64>, _: &Vector1<f64>) -> Option<Region> {
         None
     }

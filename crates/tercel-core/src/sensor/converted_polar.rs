@@ -187,6 +187,10 @@ impl<const N: usize> Sensor<N, 2> for ConvertedPolar {
         Some(self.converted(&measurement.value, &noise))
     }
 
+    fn site(&self) -> Option<Vector2<f64>> {
+        Some(self.polar.position())
+    }
+
     fn region(&self, expected: &Vector2<f64>, half: &Vector2<f64>) -> Option<Region> {
         Some(Region { centre: *expected, low: expected - half, high: expected + half })
     }

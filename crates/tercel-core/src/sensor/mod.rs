@@ -121,6 +121,12 @@ pub trait Sensor<const N: usize, const M: usize> {
         2
     }
 
+    /// Where in the plane the sensor stands, if the direction from there to the object matters to what it reads. The default is
+    /// none: it does not.
+    fn site(&self) -> Option<Vector2<f64>> {
+        None
+    }
+
     /// Area of the plane (m²) that one unit of volume of the reading's space covers near a measurement, so that a
     /// clutter intensity given per m² becomes one per unit of the reading.
     fn area(&self, _: &Measurement<M>) -> f64 {
@@ -170,6 +176,9 @@ impl<const N: usize, const M: usize, S: Sensor<N, M> + ?Sized> Sensor<N, M> for 
     }
     fn axes(&self) -> usize {
         (**self).axes()
+    }
+    fn site(&self) -> Option<Vector2<f64>> {
+        (**self).site()
     }
     fn area(&self, measurement: &Measurement<M>) -> f64 {
         (**self).area(measurement)

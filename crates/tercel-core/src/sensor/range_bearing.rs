@@ -107,6 +107,10 @@ impl<const N: usize> Sensor<N, 2> for RangeBearing {
         Some(Region { centre: self.position + centre, low: self.position + low, high: self.position + high })
     }
 
+    fn site(&self) -> Option<Vector2<f64>> {
+        Some(self.position)
+    }
+
     /// That at the measured range, or where this is less than its error at a range of its deviation.
     fn area(&self, measurement: &Measurement<2>) -> f64 {
         let own = measurement.noise.map_or(self.range, |noise| noise[(0, 0)].max(0.0).sqrt());

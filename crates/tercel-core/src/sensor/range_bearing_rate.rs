@@ -175,6 +175,10 @@ impl<const N: usize> Sensor<N, 3> for RangeBearingRate {
         Sensor::<N, 2>::region(&self.polar, &expected.xy(), &half.xy())
     }
 
+    fn site(&self) -> Option<Vector2<f64>> {
+        Some(self.polar.position())
+    }
+
     fn area(&self, measurement: &Measurement<3>) -> f64 {
         Sensor::<N, 2>::area(&self.polar, &Self::polar_part(measurement)) / self.clutter_rates
     }
