@@ -353,3 +353,25 @@ fn two_days_in_any_order_are_one_recording() {
     let ids: Vec<u64> = detections(&joined).map(|(_, detection)| detection.id).collect();
     assert!(ids.iter().copied().eq(0..48));
 }
+
+#[test]
+fn columns_units_and_names_may_be_given() {
+    let options = |columns: Option<&str>| ImportOptions {
+        read: ReadOptions {
+            columns: columns.map(|names| names.split(',').map(str::to_owned).collect()),
+            renames: vec![("icao24".to_owned(), "who".to_owned())],
+            units: vec![("height".to_owned(), "m".parse().unwrap())],
+            ..ReadOptions::default()
+        },
+        ..ImportOptions::default()
+    };
+    let read = |text: &str, options: &ImportOptions| {
+        import_from(Source::Adsb, text.as_bytes(), "own.csv", options).unwrap()
+    };
+    let with_header = read("time,who,lat,lon,alt\n1,4ca2d6,47.45,8.55,1000\n", &options(None));
+    assert_eq!(objects(&with_header)["4ca2d6"], 1);
+    expect_place(&with_header, "4ca2d6", (47.45, 8.55, 304.8));
+    let mut without = options(Some("time,who,lat,lon,height"));
+    without.read.renames.push(("altitude".to_owned(), "height".to_owned()));
+    expect_place(&read("1,4ca2d6,47.45,8.55,1000\n", &without), "4ca2d6", (47.45, 8.55, 1000.0));
+}

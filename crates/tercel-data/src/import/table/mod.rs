@@ -15,6 +15,7 @@ pub(super) use self::names::{
 use super::input::{Content, Input};
 use crate::error::{DataError, Place, Refusal};
 use crate::options::ReadOptions;
+use crate::unit::{Dimension, Unit};
 
 /// One cell of a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +70,10 @@ impl Field {
 /// A table, row by row.
 pub(super) struct Table {
     rows: Box<dyn Rows>,
+    /// Names of the columns as they are compared: those that the user gave, where there are any.
     plain: Vec<String>,
+    /// Units that the user gave.
+    units: Vec<Option<Unit>>,
     file: Arc<str>,
 }
 
@@ -81,8 +85,16 @@ impl Table {
             Content::Json(shape) => Box::new(json::JsonRows::new(input, shape)?),
             _ => Box::new(text::TextRows::new(input, options)?),
         };
-        let plain = rows.names().iter().map(|name| names::plain(name)).collect();
-        Ok(Table { rows, plain, file: Arc::clone(&input.name) })
+        let renamed =
+            |name: &String| options.renames.iter().find(|(_, file)| file == name).map(|(known, _)| known);
+        let plain = |name: &String| match options.ignore.contains(name) {
+            true => String::new(),
+            false => names::plain(renamed(name).unwrap_or(name)),
+        };
+        let unit =
+            |name: &String| options.units.iter().find(|(known, _)| known == name).map(|(_, unit)| *unit);
+        let (plain, units) = rows.names().iter().map(|name| (plain(name), unit(name))).unzip();
+        Ok(Table { rows, plain, units, file: Arc::clone(&input.name) })
     }
 
     /// The first column that has one of the names.
@@ -92,11 +104,14 @@ impl Table {
 
     /// All columns that have one of the names, the best name first.
     pub fn fields(&self, names: &Names) -> impl Iterator<Item = Field> {
-        names.found_in(&self.plain).map(|found| Field {
-            column: Some(found.column),
-            name: self.rows.names()[found.column].clone(),
-            factor: found.factor,
-            unit_named: found.unit_named,
+        names.found_in(&self.plain).map(|found| {
+            let unit = self.units[found.column].map(factor);
+            Field {
+                column: Some(found.column),
+                name: self.rows.names()[found.column].clone(),
+                factor: unit.unwrap_or(found.factor),
+                unit_named: found.unit_named || unit.is_some(),
+            }
         })
     }
 
@@ -119,12 +134,15 @@ impl Table {
 
     /// The error for columns that must be there and are not.
     pub fn missing(&self, names: &[&Names]) -> DataError {
+        let first = names.iter().flat_map(|names| names.usual()).next().unwrap_or_default();
         let missing = names.iter().map(|names| names.usual().join("` or `")).collect();
         DataError::MissingColumns {
             place: self.whole(),
             missing,
             found: self.rows.names().to_vec(),
-            help: "rename the column that holds it, or choose another source: --from".to_owned(),
+            help: format!(
+                "say which column holds it: --column {first}=NAME, or choose another source: --from"
+            ),
         }
     }
 
@@ -223,6 +241,11 @@ impl Table {
         let help = refusal.help.clone().unwrap_or_else(|| SKIP.to_owned());
         refusal.helped(help).at(self.rows.place(), &field.name)
     }
+}
+
+/// What brings a unit to SI, or to degrees.
+fn factor(unit: Unit) -> f64 {
+    if unit.dimension() == Dimension::Angle { unit.factor().to_degrees() } else { unit.factor() }
 }
 
 /// The way out for a file of which few rows are bad.
