@@ -112,6 +112,8 @@ impl Making {
                 covariance: Vec::new(),
                 modes: Vec::new(),
                 extent: None,
+                altitude: None,
+                identity: None,
                 detection: None,
             });
         }

@@ -172,7 +172,7 @@ fn long(scans: usize) -> (Detections, Tracks, Truths) {
             }
         });
         let detections = plots.collect();
-        seen.scans.push(Scan { time, sensor: "radar".into(), position: Some([1.5, 2.5, 0.0]), detections });
+        seen.scans.push(Scan { position: Some([1.5, 2.5, 0.0]), ..Scan::new(time, "radar", detections) });
         for k in 0..20 {
             let ([x, y], life) = (place(k), (scan + 10 * k) / 200);
             let number = (20 * life + k) as u64;
