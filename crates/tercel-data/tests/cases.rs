@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use tercel_data::table::Observation;
 use tercel_data::{
-    Angles, Bearings, DateOrder, Format, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import,
-    import_table_from, read_detections_from,
+    Angles, Bearings, DataError, DateOrder, Format, ImportOptions, Imported, OnError, ReadOptions, Source,
+    Unit, import, import_from, read_detections_from,
 };
 
 fn path(name: &str) -> PathBuf {
@@ -223,14 +223,18 @@ fn a_time_in_the_future_costs_no_other_row() {
     assert_eq!(imported.detections.scans.len(), 41);
 }
 
+fn from_text(source: Source, text: &str, name: &str, options: &ReadOptions) -> Result<Imported, DataError> {
+    let options = ImportOptions { read: options.clone(), ..ImportOptions::default() };
+    import_from(source, text.as_bytes(), name, &options)
+}
+
 /// A table in CSV, with what was said about it.
 fn csv(text: &str, options: &ReadOptions) -> Imported {
-    import_table_from(text.as_bytes(), Format::Csv, "a.csv", options)
-        .unwrap_or_else(|error| panic!("{error}\n{text}"))
+    from_text(Source::Csv, text, "a.csv", options).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 fn refused(text: &str, options: &ReadOptions) -> String {
-    let error = import_table_from(text.as_bytes(), Format::Csv, "a.csv", options).unwrap_err();
+    let error = from_text(Source::Csv, text, "a.csv", options).unwrap_err();
     format!("{error}\n{}", error.help().unwrap_or_default())
 }
 
@@ -365,7 +369,7 @@ fn numbers_of_scans_may_begin_anew_and_rows_of_a_scan_stand_anywhere() {
 #[test]
 fn json_is_read_in_every_arrangement() {
     let read = |text: &str| {
-        import_table_from(text.as_bytes(), Format::Ndjson, "a.json", &ReadOptions::default())
+        from_text(Source::Ndjson, text, "a.json", &ReadOptions::default())
             .unwrap_or_else(|error| panic!("{error}: {:?}\n{text}", error.help()))
     };
     let plain = read("{\"time\":0,\"x\":1,\"y\":2}\n{\"time\":1,\"x\":3,\"y\":4}\n").detections;

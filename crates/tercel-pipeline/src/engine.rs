@@ -194,9 +194,9 @@ where
         let with = (station, look, names);
         match &station.kind {
             Kind::Position(sensor) => self.run(sensor, &sensors::positions(scan)?, with),
-            Kind::Converted(sensor) => self.run(sensor, &sensors::ranges(scan)?, with),
-            Kind::RangeBearing(sensor) => self.run(sensor, &sensors::ranges(scan)?, with),
-            Kind::RangeBearingRate(sensor) => self.run(sensor, &sensors::range_rates(scan)?, with),
+            Kind::Converted(sensor) => self.run(sensor, &sensors::ranges(station, scan)?, with),
+            Kind::RangeBearing(sensor) => self.run(sensor, &sensors::ranges(station, scan)?, with),
+            Kind::RangeBearingRate(sensor) => self.run(sensor, &sensors::range_rates(station, scan)?, with),
             Kind::Bearing(sensor) => self.run(sensor, &sensors::bearings(scan)?, with),
         }
     }

@@ -39,6 +39,7 @@ mod numbered;
 mod pipeline;
 mod reorder;
 mod sensors;
+mod slant;
 mod turns;
 mod understood;
 

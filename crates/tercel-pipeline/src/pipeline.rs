@@ -1,10 +1,10 @@
 //! Scans in, tracks out.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
 use tercel_core::multi::{Clutter, Status, Use};
-use tercel_data::table::{Description, Scan, Track};
+use tercel_data::table::{Description, Detection, Scan, Track};
 
 use crate::PipelineError;
 use crate::config::{ClockSetBack, Config, OutOfOrder};
@@ -248,6 +248,24 @@ impl Pipeline {
     fn track(&mut self, look: &Look) -> Result<Vec<Track>, PipelineError> {
         let Some(station) = self.stations.get_mut(&look.scan.sensor) else { return Ok(Vec::new()) };
         station.move_to(&look.scan);
+        // An object that reports twice at one time is one object: the second report is taken after the first.
+        let again = if station.detection.is_reports() { repeated(&look.scan) } else { Vec::new() };
+        if again.is_empty() {
+            return self.step(look);
+        }
+        let (mut first, mut second) = (look.clone(), look.clone());
+        let mut number = 0..;
+        first.scan.detections.retain(|_| number.next().is_some_and(|number| !again.contains(&number)));
+        second.scan.detections = again.iter().map(|&number| look.scan.detections[number].clone()).collect();
+        let mut rows = self.step(&first)?;
+        let later = self.track(&second)?;
+        self.summary.scans -= 1;
+        rows.extend(later);
+        Ok(rows)
+    }
+
+    fn step(&mut self, look: &Look) -> Result<Vec<Track>, PipelineError> {
+        let Some(station) = self.stations.get_mut(&look.scan.sensor) else { return Ok(Vec::new()) };
         let mut outcome = self.engine.step(station, look, &mut self.names)?;
         learn(station, &outcome);
         if self.numbers.1 > 0 {
@@ -294,6 +312,19 @@ impl Pipeline {
 /// Rows of a scan in a table.
 pub(crate) fn rows(scan: &Scan) -> u64 {
     scan.detections.len().max(1) as u64
+}
+
+/// Which detections name an object that another one before them names, by their numbers.
+fn repeated(scan: &Scan) -> Vec<usize> {
+    if scan.detections.len() < 2 {
+        return Vec::new();
+    }
+    let mut seen = HashSet::with_capacity(scan.detections.len());
+    let named = |(number, detection): (usize, &Detection)| {
+        let name = detection.identity.as_ref()?;
+        (!seen.insert(Arc::clone(name))).then_some(number)
+    };
+    scan.detections.iter().enumerate().filter_map(named).collect()
 }
 
 /// Teaches the clutter map of a sensor with its detections, each in the measure in which no track explains it.

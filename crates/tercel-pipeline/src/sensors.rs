@@ -13,6 +13,7 @@ use tercel_data::table::{self, Observation, Scan};
 use crate::PipelineError;
 use crate::carrier::{Carrier, Velocity};
 use crate::config::{ClutterConfig, DetectionConfig, Measures, SensorConfig, SensorKind};
+use crate::slant::Slant;
 use crate::turns::Turns;
 
 /// A sensor of the configuration, with what was learned of its clutter.
@@ -28,6 +29,7 @@ pub(crate) struct Station {
     /// Where it stands unless a scan says.
     pub position: Vector2<f64>,
     carrier: Carrier,
+    slant: Slant,
 }
 
 /// What it measures.
@@ -63,6 +65,7 @@ impl Station {
             turns: config.scans.as_ref().map(|turn| Turns::new(turn.period.get())),
             position,
             carrier: Carrier::new(config.position_deviation.get()),
+            slant: Slant::new(&config.measures),
         })
     }
 
@@ -73,8 +76,9 @@ impl Station {
 
     /// Moves the sensor to where the scan says it is. Its velocity is that of the scan, or follows from its last places.
     pub fn move_to(&mut self, scan: &Scan) {
-        let Some([x, y, _]) = scan.position else { return };
+        let Some([x, y, z]) = scan.position else { return };
         self.position = vector![x, y];
+        self.slant.sensor = z;
         let velocity = match scan.velocity {
             Some([vx, vy, _]) => Velocity { value: vector![vx, vy], deviation: 0.0 },
             None => {
@@ -120,7 +124,10 @@ impl Kind {
             Kind::Position(sensor) => Kind::Position(sensor),
             Kind::Converted(sensor) => Kind::Converted(sensor.at(place)),
             Kind::RangeBearing(sensor) => Kind::RangeBearing(sensor.at(place)),
-            Kind::RangeBearingRate(sensor) => Kind::RangeBearingRate(sensor.at(place, velocity.value)),
+            Kind::RangeBearingRate(sensor) => {
+                let moved = sensor.at(place, velocity.value);
+                Kind::RangeBearingRate(moved.with_velocity_deviation(velocity.deviation).unwrap_or(moved))
+            }
             Kind::Bearing(sensor) => Kind::Bearing(sensor.at(place)),
         }
     }
@@ -166,10 +173,11 @@ pub(crate) fn positions(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineErro
 }
 
 /// The detections of a scan as ranges and bearings.
-pub(crate) fn ranges(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> {
+pub(crate) fn ranges(station: &Station, scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> {
     collect(scan, "range and bearing", "position", |detection, age| match detection.observation {
-        Observation::Polar { range: Some(range), bearing, .. } => {
-            let noise = diagonal([detection.noise.range, detection.noise.bearing]);
+        Observation::Polar { range: Some(range), bearing, z, .. } => {
+            let (range, noise, _) = station.slant.over_ground(range, z, &detection.noise);
+            let noise = diagonal([noise.range, noise.bearing]);
             Some(Measurement { value: vector![range, bearing], noise, age })
         }
         _ => None,
@@ -177,12 +185,12 @@ pub(crate) fn ranges(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> 
 }
 
 /// The detections of a scan as ranges, bearings and range rates.
-pub(crate) fn range_rates(scan: &Scan) -> Result<Vec<Measurement<3>>, PipelineError> {
+pub(crate) fn range_rates(station: &Station, scan: &Scan) -> Result<Vec<Measurement<3>>, PipelineError> {
     collect(scan, "range, bearing and range rate", "position", |detection, age| match detection.observation {
-        Observation::Polar { range: Some(range), bearing, range_rate: Some(rate) } => {
-            let noise =
-                diagonal([detection.noise.range, detection.noise.bearing, detection.noise.range_rate]);
-            Some(Measurement { value: vector![range, bearing, rate], noise, age })
+        Observation::Polar { range: Some(range), bearing, range_rate: Some(rate), z } => {
+            let (range, noise, stretch) = station.slant.over_ground(range, z, &detection.noise);
+            let noise = diagonal([noise.range, noise.bearing, noise.range_rate]);
+            Some(Measurement { value: vector![range, bearing, rate * stretch], noise, age })
         }
         _ => None,
     })

@@ -27,10 +27,13 @@ fn observed(kind: &str, time: f64) -> Observation {
     let range = f64::hypot(x, y);
     match kind {
         "position" => Observation::Position { x, y, z: None },
-        "bearing" => Observation::Polar { range: None, bearing: y.atan2(x), range_rate: None },
-        _ => {
-            Observation::Polar { range: Some(range), bearing: y.atan2(x), range_rate: Some(10.0 * x / range) }
-        }
+        "bearing" => Observation::Polar { range: None, bearing: y.atan2(x), range_rate: None, z: None },
+        _ => Observation::Polar {
+            range: Some(range),
+            bearing: y.atan2(x),
+            range_rate: Some(10.0 * x / range),
+            z: None,
+        },
     }
 }
 

@@ -172,7 +172,7 @@ mod tests {
     /// Scans that come out, with their times and numbers of plots, of plots at these times (s).
     fn gathered(turns: &mut Turns, plots: &[(f64, f64)]) -> Vec<(f64, usize)> {
         let plot = |(id, &(time, bearing)): (usize, &(f64, f64))| {
-            let observation = Observation::Polar { range: Some(1e4), bearing, range_rate: None };
+            let observation = Observation::Polar { range: Some(1e4), bearing, range_rate: None, z: None };
             Scan::new(time, "radar", vec![Detection::new(id as u64, observation)])
         };
         let scans = plots.iter().enumerate().map(plot);
@@ -211,8 +211,12 @@ mod tests {
         for turn in 0..12 {
             for bearing in bearings {
                 let time = (f64::from(turn) + bearing / TAU) * 4.0;
-                let observation =
-                    Observation::Polar { range: Some(1e4), bearing: wrapped(bearing), range_rate: None };
+                let observation = Observation::Polar {
+                    range: Some(1e4),
+                    bearing: wrapped(bearing),
+                    range_rate: None,
+                    z: None,
+                };
                 let scan = Scan::new(time, "radar", vec![Detection::new(0, observation)]);
                 sectors.extend(turns.push(scan, Vector2::zeros()));
             }

@@ -203,6 +203,7 @@ fn bearings(scan: &RawScan) -> Option<Vec<Observation>> {
         range: None,
         bearing: wrapped(FRAC_PI_2 - compass),
         range_rate: None,
+        z: None,
     };
     match &scan.measurement {
         Measurement::One(bearing) => Some(vec![observation(bearing)]),

@@ -149,8 +149,8 @@ fn fill_row(sheet: &mut Sheet, number: u64, scan: &Scan, detection: Option<&Dete
     let (xyz, polar) = match detection.map(|detection| detection.observation) {
         None => ([None; 3], [None; 3]),
         Some(Observation::Position { x, y, z }) => ([Some(x), Some(y), z], [None; 3]),
-        Some(Observation::Polar { range, bearing, range_rate }) => {
-            ([None; 3], [range, Some(bearing), range_rate])
+        Some(Observation::Polar { range, bearing, range_rate, z }) => {
+            ([None, None, z], [range, Some(bearing), range_rate])
         }
     };
     let noise = detection.map(|detection| detection.noise).unwrap_or_default();

@@ -217,7 +217,7 @@ impl<'a> Rows<'a> {
     fn observation(&self, row: usize) -> Result<Option<Observation>, (&'static str, &'static str)> {
         let [x, y, z] = self.xyz.map(|cells| cells.get(row));
         let [range, bearing, range_rate] = self.polar.map(|cells| cells.get(row));
-        let position = x.is_some() || y.is_some() || z.is_some();
+        let position = x.is_some() || y.is_some();
         let polar = range.is_some() || bearing.is_some() || range_rate.is_some();
         match (x, y, bearing) {
             _ if position && polar => Err((
@@ -226,8 +226,10 @@ impl<'a> Rows<'a> {
             )),
             (Some(x), Some(y), _) => Ok(Some(Observation::Position { x, y, z })),
             _ if position => Err(("a position needs both x and y", "fill the other cell")),
-            (_, _, Some(bearing)) => Ok(Some(Observation::Polar { range, bearing, range_rate })),
+            // A height beside a range says that it is a slant range.
+            (_, _, Some(bearing)) => Ok(Some(Observation::Polar { range, bearing, range_rate, z })),
             _ if polar => Err(("a range or range rate needs a bearing", "fill the column `bearing`")),
+            _ if z.is_some() => Err(("a height alone is no measurement", "fill x and y, or the bearing")),
             _ => Ok(None),
         }
     }

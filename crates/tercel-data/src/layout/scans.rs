@@ -131,8 +131,8 @@ fn key(detection: &Detection) -> ([Option<u64>; 4], Option<Arc<str>>) {
     let bits = |number: f64| Some(number.to_bits());
     let measured = match detection.observation {
         Observation::Position { x, y, z } => [bits(x), bits(y), z.and_then(bits), None],
-        Observation::Polar { range, bearing, range_rate } => {
-            [range.and_then(bits), bits(bearing), range_rate.and_then(bits), Some(1)]
+        Observation::Polar { range, bearing, range_rate, z } => {
+            [range.and_then(bits), bits(bearing), range_rate.and_then(bits), Some(z.map_or(1, f64::to_bits))]
         }
     };
     (measured, detection.identity.clone())

@@ -139,6 +139,8 @@ pub enum Observation {
         bearing: f64,
         /// Range rate, m/s, positive when the object recedes.
         range_rate: Option<f64>,
+        /// Height of the object in the local frame, m, when it came with the measurement; the range is then a slant range.
+        z: Option<f64>,
     },
 }
 

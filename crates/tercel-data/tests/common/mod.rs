@@ -38,8 +38,8 @@ fn origin() -> impl Strategy<Value = Option<Origin>> {
 fn observation() -> impl Strategy<Value = Observation> {
     prop_oneof![
         (finite(), finite(), option::of(finite())).prop_map(|(x, y, z)| Observation::Position { x, y, z }),
-        (option::of(positive()), angle(), option::of(finite()))
-            .prop_map(|(range, bearing, range_rate)| Observation::Polar { range, bearing, range_rate }),
+        (option::of(positive()), angle(), option::of(finite()), option::of(finite()))
+            .prop_map(|(range, bearing, range_rate, z)| Observation::Polar { range, bearing, range_rate, z }),
     ]
 }
 

@@ -36,6 +36,10 @@ pub struct SensorConfig {
     pub clutter: ClutterConfig,
 }
 
+fn thirty_metres() -> NonNegative {
+    NonNegative::constant(30.0)
+}
+
 fn five_metres() -> NonNegative {
     NonNegative::constant(5.0)
 }
@@ -116,6 +120,15 @@ pub struct Polar {
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
     pub range_rate_deviation: Option<Positive>,
+    /// Height of the objects above the sensor where the detections do not bring it (`z`): ranges are slant ranges, and are
+    /// corrected to ranges over ground. Without either they are taken as ranges over ground.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
+    pub height: Option<NonNegative>,
+    /// Standard deviation of heights that do not bring their own.
+    #[serde(default = "thirty_metres")]
+    #[schemars(extend("x-unit" = "m"))]
+    pub height_deviation: NonNegative,
     /// Turn range and bearing into a position first (debiased, with rotated covariance). Not with range rates.
     #[serde(default)]
     pub convert: bool,

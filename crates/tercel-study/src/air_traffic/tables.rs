@@ -30,7 +30,7 @@ pub fn detections(recording: &Recording) -> Detections {
             truth: Some(object.clone()),
             ..Detection::new(
                 step as u64,
-                Observation::Polar { range: Some(plot.x), bearing: plot.y, range_rate: None },
+                Observation::Polar { range: Some(plot.x), bearing: plot.y, range_rate: None, z: None },
             )
         };
         Scan {

@@ -140,8 +140,12 @@ impl Making {
             let used = (self.dice.uniform() < 0.9).then(|| {
                 let range = (x - own[0]).hypot(y - own[1]) + 4.0 * self.dice.normal();
                 let bearing = (y - own[1]).atan2(x - own[0]) + 0.012 * self.dice.normal();
-                let observation =
-                    Observation::Polar { range: Some(range), bearing, range_rate: Some(self.dice.normal()) };
+                let observation = Observation::Polar {
+                    range: Some(range),
+                    bearing,
+                    range_rate: Some(self.dice.normal()),
+                    z: None,
+                };
                 seen.push(self.detection(observation, Some(i)));
                 self.next - 1
             });
@@ -150,9 +154,10 @@ impl Making {
         for _ in 0..clutter {
             let bearing = PI * (2.0 * self.dice.uniform() - 1.0);
             let range = 700.0 * self.dice.uniform().sqrt();
-            seen.push(
-                self.detection(Observation::Polar { range: Some(range), bearing, range_rate: None }, None),
-            );
+            seen.push(self.detection(
+                Observation::Polar { range: Some(range), bearing, range_rate: None, z: None },
+                None,
+            ));
         }
         self.scan(time, "radar", own, seen);
     }

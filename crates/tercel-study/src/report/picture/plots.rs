@@ -176,12 +176,12 @@ impl Place {
         };
         match *observation {
             Observation::Position { x, y, .. } => at(x, y, f64::NAN, None),
-            Observation::Polar { range: Some(range), bearing, range_rate } => {
+            Observation::Polar { range: Some(range), bearing, range_rate, .. } => {
                 let (sine, cosine) = bearing.sin_cos();
                 at(sensor[0] + range * cosine, sensor[1] + range * sine, f64::NAN, range_rate)
             }
             // Without a finite bearing there is no ray to draw: the sine is then NaN, and so is the place.
-            Observation::Polar { range: None, bearing, range_rate } => {
+            Observation::Polar { range: None, bearing, range_rate, .. } => {
                 at(sensor[0] + 0.0 * bearing.sin(), sensor[1], bearing, range_rate)
             }
         }
@@ -215,8 +215,9 @@ mod tests {
             range: Some(10.0),
             bearing: std::f64::consts::FRAC_PI_2,
             range_rate: Some(-2.0),
+            z: None,
         };
-        let ray = Observation::Polar { range: None, bearing: 1.0, range_rate: None };
+        let ray = Observation::Polar { range: None, bearing: 1.0, range_rate: None, z: None };
         let (json, remarks) = plots(vec![scan(0.0, &[north, ray])], 100);
         assert_eq!(json["detections"]["x"], serde_json::json!([100, 100]));
         assert_eq!(json["detections"]["y"], serde_json::json!([60, 50]));
@@ -228,7 +229,7 @@ mod tests {
     #[test]
     fn what_cannot_be_placed_is_counted() {
         let lost = Observation::Position { x: f64::NAN, y: 0.0, z: None };
-        let ray = Observation::Polar { range: None, bearing: f64::INFINITY, range_rate: None };
+        let ray = Observation::Polar { range: None, bearing: f64::INFINITY, range_rate: None, z: None };
         let fine = Observation::Position { x: 1.0, y: 0.0, z: None };
         let (json, remarks) = plots(vec![scan(0.0, &[lost, fine, ray]), scan(f64::NAN, &[fine])], 100);
         assert_eq!(json["scans"]["n"], serde_json::json!([1]));
