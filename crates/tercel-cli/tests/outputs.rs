@@ -205,17 +205,15 @@ fn scores_and_reports_do_not_depend_on_the_rows_that_are_written() {
 #[test]
 fn what_is_left_out_is_said_wherever_people_look() {
     let folder = tempfile::tempdir().unwrap();
-    let table = folder.path().join("late.csv");
-    let content =
-        "time,sensor,x,y\n0,radar,0,0\n2,radar,1,0\n1,radar,1,0\n1,radar,9,9\n3,camera,1,1\n3,radar,1,0\n";
-    std::fs::write(&table, content).unwrap();
-    let arguments = ["track", text(&table), "-c", "tracker.toml"];
+    let tracks = folder.path().join("tracks.csv");
+    let lines = support::late_and_ignored();
+    let arguments = ["track", "-", "-c", "tracker.toml", "-o", text(&tracks)];
     let sentence = "3 rows: a scan that came too late (2), a sensor that the configuration ignores (1)";
-    let loud = run(arguments).succeeded();
+    let loud = run_with_input(arguments, &lines).succeeded();
     assert!(loud.stdout.contains(sentence), "{}", loud.stdout);
-    let quiet = run(arguments.into_iter().chain(["-q"])).succeeded();
+    let quiet = run_with_input(arguments.into_iter().chain(["-q"]), &lines).succeeded();
     assert_eq!(quiet.stderr, format!("left out {sentence}\n"));
-    let json = run(arguments.into_iter().chain(["-q", "--json"])).succeeded().json();
+    let json = run_with_input(arguments.into_iter().chain(["-q", "--json"]), &lines).succeeded().json();
     let account = serde_json::json!([
         {"reason": "a scan that came too late", "rows": 2},
         {"reason": "a sensor that the configuration ignores", "rows": 1},

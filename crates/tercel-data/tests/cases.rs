@@ -386,7 +386,7 @@ fn json_is_read_in_every_arrangement() {
     assert_eq!(read(document).detections, plain);
     let nowhere = "{\"time\":0,\"sensor\":\"a\",\"foo\":1,\"bar\":2}\n";
     let error =
-        import_table_from(nowhere.as_bytes(), Format::Ndjson, "a.json", &ReadOptions::default()).unwrap_err();
+        from_text(Source::Ndjson, nowhere, "a.json", &ReadOptions::default()).unwrap_err();
     assert!(error.to_string().contains("the keys are `bar`, `foo`, `sensor`, `time`"), "{error}");
 }
 

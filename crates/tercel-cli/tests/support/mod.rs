@@ -84,3 +84,17 @@ pub fn lines() -> Vec<String> {
     };
     (0..6).map(line).collect()
 }
+
+/// Five scans as lines: one of two detections comes too late, and one is of a sensor that `tracker.toml` ignores.
+pub fn late_and_ignored() -> String {
+    let rows = [
+        (0, "radar", 0),
+        (2, "radar", 1),
+        (1, "radar", 1),
+        (1, "radar", 9),
+        (3, "camera", 1),
+        (3, "radar", 1),
+    ];
+    let line = |(time, sensor, x)| format!("{{\"time\":{time},\"sensor\":\"{sensor}\",\"x\":{x},\"y\":0}}\n");
+    rows.into_iter().map(line).collect()
+}

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use tercel_data::ndjson::Scans;
 use tercel_data::table::{Origin, Scan, Truths};
-use tercel_data::{DataError, ImportOptions, Imported, Source};
+use tercel_data::{DataError, ImportOptions, Imported, ReadOptions, Source};
 use tercel_pipeline::PipelineError;
 
 use self::outcome::Outcome;
@@ -211,7 +211,8 @@ impl TrackArguments {
     fn run_stream(&self, console: &Console) -> Result<Outcome, Failure> {
         let named = self.config.as_deref().map(Chosen::read).transpose()?;
         let truths = self.truths(None)?;
-        let mut scans = Scans::new(std::io::stdin().lock(), STDIN, self.read.options());
+        let options = ReadOptions { origin: self.origin, ..self.read.options() };
+        let mut scans = Scans::new(std::io::stdin().lock(), STDIN, options);
         // What the stream was before stands in its first line; without it nobody can choose a configuration.
         let mut next = scans.next();
         let chosen = match named {
@@ -242,6 +243,7 @@ impl TrackArguments {
         run.begin(origin::settle(scans.origin(), self.origin)?, scans.description(), &[])?;
         run.end()?.map_err(|error| self.refused(error))?;
         teller.tell(run.notices(), console);
+        scans.notes().iter().for_each(|note| console.note(note));
         let (config, configuration) = (chosen.config, chosen.name);
         let (left_out, reading) = (Account::default(), Duration::ZERO);
         Ok(Outcome { run, truths, config, configuration, left_out, bad, reading })
