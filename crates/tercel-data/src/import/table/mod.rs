@@ -85,12 +85,14 @@ impl Table {
             Content::Json(shape) => Box::new(json::JsonRows::new(input, shape)?),
             _ => Box::new(text::TextRows::new(input, options)?),
         };
-        let renamed = |name: &String| options.renames.iter().find(|(_, file)| file == name).map(|(known, _)| known);
+        let renamed =
+            |name: &String| options.renames.iter().find(|(_, file)| file == name).map(|(known, _)| known);
         let plain = |name: &String| match options.ignore.contains(name) {
             true => String::new(),
             false => names::plain(renamed(name).unwrap_or(name)),
         };
-        let unit = |name: &String| options.units.iter().find(|(known, _)| known == name).map(|(_, unit)| *unit);
+        let unit =
+            |name: &String| options.units.iter().find(|(known, _)| known == name).map(|(_, unit)| *unit);
         let (plain, units) = rows.names().iter().map(|name| (plain(name), unit(name))).unzip();
         Ok(Table { rows, plain, units, file: Arc::clone(&input.name) })
     }
@@ -138,7 +140,9 @@ impl Table {
             place: self.whole(),
             missing,
             found: self.rows.names().to_vec(),
-            help: format!("say which column holds it: --column {first}=NAME, or choose another source: --from"),
+            help: format!(
+                "say which column holds it: --column {first}=NAME, or choose another source: --from"
+            ),
         }
     }
 
