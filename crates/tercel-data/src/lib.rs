@@ -57,8 +57,8 @@ pub use npy::{Array, read_npy, read_npy_from};
 pub use options::{Bearings, DateOrder, OnError, ReadOptions};
 pub use output::AtomicFile;
 pub use read::{
-    read_detections, read_detections_from, read_metrics, read_metrics_from, read_tracks, read_tracks_from,
-    read_truths, read_truths_from,
+    import_table_from, read_detections, read_detections_from, read_metrics, read_metrics_from, read_tracks,
+    read_tracks_from, read_truths, read_truths_from,
 };
 pub use tracks_writer::TracksWriter;
 pub use unit::Unit;

@@ -385,8 +385,7 @@ fn json_is_read_in_every_arrangement() {
     let document = "{\"data\":[{\"time\":0,\"x\":1,\"y\":2},{\"time\":1,\"x\":3,\"y\":4}]}";
     assert_eq!(read(document).detections, plain);
     let nowhere = "{\"time\":0,\"sensor\":\"a\",\"foo\":1,\"bar\":2}\n";
-    let error =
-        from_text(Source::Ndjson, nowhere, "a.json", &ReadOptions::default()).unwrap_err();
+    let error = from_text(Source::Ndjson, nowhere, "a.json", &ReadOptions::default()).unwrap_err();
     assert!(error.to_string().contains("the keys are `bar`, `foo`, `sensor`, `time`"), "{error}");
 }
 

@@ -8,7 +8,7 @@ use super::{ImportOptions, Imported, autoferry};
 use crate::error::DataError;
 use crate::import::LeftOut;
 use crate::options::ReadOptions;
-use crate::read::{read_as, read_stream_as};
+use crate::read::{import_table_from, read_as};
 use crate::table::{Description, Origin};
 
 /// Brings in files.
@@ -42,7 +42,7 @@ pub(super) fn import_from(
     options: &ImportOptions,
 ) -> Result<Imported, DataError> {
     match source.kind() {
-        Kind::Table(format) => read_stream_as(reader, format, name, &read_options(options, None)),
+        Kind::Table(format) => import_table_from(reader, format, name, &read_options(options, None)),
         _ => {
             let detections = autoferry::read_detections_from(reader, name)?;
             Ok(Imported { detections, ..Imported::default() })

@@ -61,7 +61,8 @@ fn checks(body: &str, sum: &str) -> bool {
 /// The time in a tag block, or in front of the sentence.
 fn time_before(before: &str) -> Result<Option<f64>, &'static str> {
     let Some(start) = before.find('\\') else {
-        return Ok(moment(before.trim_matches([' ', ',', ';', '\t', '[', ']', '"', '|'])));
+        let parts = before.split([',', ';', '\t', '|']).chain(before.split(' '));
+        return Ok(std::iter::once(before).chain(parts).find_map(moment));
     };
     let block = before[start..].trim_matches('\\');
     let (fields, sum) = block.rsplit_once('*').unwrap_or((block, ""));
@@ -73,18 +74,19 @@ fn time_before(before: &str) -> Result<Option<f64>, &'static str> {
 
 /// The time among the fields after the checksum: the last one that is a time.
 fn time_after(after: &str) -> Option<f64> {
-    after.split([',', ';', '\t']).rev().find_map(|field| moment(field.trim()))
+    after.split([',', ';', '\t']).rev().find_map(|field| moment(field))
 }
 
-/// A time of receipt. Smaller numbers are counters and signal strengths.
+/// A time of receipt. Smaller numbers are counters and signal strengths, and a date alone is only a part of a time.
 fn moment(text: &str) -> Option<f64> {
     const EARLIEST: f64 = 3e8;
+    let text = text.trim_matches([' ', ',', ';', ':', '\t', '[', ']', '(', ')', '"', '|']);
     match Moment::parse(text)? {
         Moment::Number(number) => {
             Some(if number < 1e11 { number } else { number / 1e3 }).filter(|time| *time > EARLIEST)
         }
-        Moment::Instant(time) | Moment::Civil(time) => Some(time),
-        Moment::Slashed { .. } | Moment::OfDay(_) => None,
+        Moment::Instant(time) | Moment::Civil(time) if text.contains([':', 'T', '_']) => Some(time),
+        _ => None,
     }
 }
 
@@ -104,6 +106,8 @@ mod tests {
             format!("1709632800000,{BARE}"),
             format!("2024-03-05T10:00:00Z,{BARE}"),
             format!("[2024-03-05 10:00:00] {BARE}"),
+            format!("2024-03-05 10:00:00,rx1,{BARE}"),
+            format!("rx1 1709632800: {BARE}"),
         ] {
             let sentence = Sentence::read(&line).unwrap();
             assert_eq!(sentence.time, Some(1_709_632_800.0), "{line}");
