@@ -64,10 +64,16 @@ impl Crowd {
     /// How many of the objects have a believed track within 20 m after the last scan, and how many believed tracks are left
     /// over.
     fn follow<T: Tracker<Belief = Gaussian<4>>>(&self, mut tracker: T) -> (usize, usize) {
-        let filter = Kalman::new(ConstantVelocity::new(0.1).with_speed(10.0), Position::<2>::new(5.0).unwrap());
+        let filter =
+            Kalman::new(ConstantVelocity::new(0.1).with_speed(10.0), Position::<2>::new(5.0).unwrap());
         let detection = Detection::uniform(0.95).unwrap();
         for (step, plots) in self.scans.iter().enumerate() {
-            let scan = Scan { time: step as f64, measurements: plots, detection: &detection, clutter: &self.clutter };
+            let scan = Scan {
+                time: step as f64,
+                measurements: plots,
+                detection: &detection,
+                clutter: &self.clutter,
+            };
             tracker.step(&filter, &scan).unwrap();
         }
         let believed = |status| matches!(status, Status::Confirmed | Status::Coasted);
@@ -93,21 +99,36 @@ impl Crowd {
     }
 }
 
-#[test]
-fn print_all() {
-    for room in [120.0, 80.0, 60.0, 50.0] {
-        let crowd = Crowd::new(room);
-        let mut p = |n: &str, f: &dyn Fn() -> (usize, usize)| {
-            let t = std::time::Instant::now();
-            let r = f();
-            println!("{room} {n}: {r:?} {:?} ms/scan", t.elapsed().as_millis() as f64 / SCANS as f64);
-        };
-        p("nn", &|| crowd.follow(NearestNeighbour::new(NearestNeighbourConfig::default()).unwrap()));
-        p("jpda", &|| crowd.follow(Jpda::new(JpdaConfig::default()).unwrap()));
-        p("phd", &|| crowd.follow(Phd::new(PhdConfig::default()).unwrap()));
-        p("phd10000", &|| crowd.follow(Phd::new(PhdConfig{cap:10000,..PhdConfig::default()}).unwrap()));
-        p("mb", &|| crowd.follow(MultiBernoulli::new(MultiBernoulliConfig::default()).unwrap()));
-        p("mb10000", &|| crowd.follow(MultiBernoulli::new(MultiBernoulliConfig{cap:10000,..MultiBernoulliConfig::default()}).unwrap()));
-        p("pmbm", &|| crowd.follow(Pmbm::new(PmbmConfig::default()).unwrap()));
+/// Follows a crowd with a square of 120, 80 and 60 m for each object, and demands that so many are found.
+fn check<T: Tracker<Belief = Gaussian<4>>>(least: [usize; 3], make: impl Fn() -> T) {
+    for (room, least) in [120.0, 80.0, 60.0].into_iter().zip(least) {
+        let (found, others) = Crowd::new(room).follow(make());
+        assert!(found >= least, "{room} m: {found} of {OBJECTS} found");
+        assert!(others <= OBJECTS / 10, "{room} m: {others} tracks of nothing");
     }
+}
+
+#[test]
+fn nearest_neighbour_starts_in_a_crowd() {
+    check([290, 290, 250], || NearestNeighbour::new(NearestNeighbourConfig::default()).unwrap());
+}
+
+#[test]
+fn jpda_starts_in_a_crowd() {
+    check([290, 290, 250], || Jpda::new(JpdaConfig::default()).unwrap());
+}
+
+#[test]
+fn pmbm_starts_in_a_crowd() {
+    check([290, 270, 200], || Pmbm::new(PmbmConfig::default()).unwrap());
+}
+
+#[test]
+fn multi_bernoulli_starts_in_a_crowd() {
+    check([290, 270, 250], || MultiBernoulli::new(MultiBernoulliConfig::default()).unwrap());
+}
+
+#[test]
+fn phd_starts_in_a_crowd() {
+    check([290, 250, 150], || Phd::new(PhdConfig::default()).unwrap());
 }

@@ -51,9 +51,28 @@ impl<B> Default for Roster<B> {
 }
 
 impl<B: Clone> Roster<B> {
-    /// Forgets the tracks that were deleted in the last scan.
-    pub fn begin(&mut self) {
+    /// Forgets the tracks that were deleted in the last scan, and lets time pass.
+    pub fn begin(&mut self, dt: f64) {
         self.tracks.retain(|track| track.status != Status::Deleted);
+        self.tracks.iter_mut().for_each(|track| track.wait(dt));
+    }
+
+    /// Raises the weights of each label, where they add up to less than its track exists at the least: see [`Management`].
+    pub fn hold<'a>(
+        &self,
+        weights: impl Iterator<Item = (TrackId, &'a mut f64)>,
+        (time, survival): (f64, f64),
+    ) {
+        let mut labels: BTreeMap<TrackId, Vec<&mut f64>> = BTreeMap::new();
+        weights.for_each(|(label, weight)| labels.entry(label).or_default().push(weight));
+        for track in &self.tracks {
+            let Some(weights) = labels.get_mut(&track.id) else { continue };
+            let sum: f64 = weights.iter().map(|weight| **weight).sum();
+            let least = Management::least(track, time, survival);
+            if sum > 0.0 && sum < least {
+                weights.iter_mut().for_each(|weight| **weight *= least / sum);
+            }
+        }
     }
 
     fn fresh(&mut self) -> TrackId {

@@ -94,7 +94,8 @@ impl Management {
     pub(super) fn judge<B>(&self, track: &mut Track<B>, time: f64) {
         let doubtful = track.existence < self.min_existence;
         let seen = track.measurement.is_some();
-        let coast = self.max_coast.unwrap_or_else(|| COAST.max((f64::from(self.max_misses) + 1.0) * track.pace));
+        let coast =
+            self.max_coast.unwrap_or_else(|| COAST.max((f64::from(self.max_misses) + 1.0) * track.pace));
         let give_up = track.misses > self.max_misses
             || time - track.updated > coast
             || doubtful && (self.ends_by_existence(track.confirmed) || track.confirmed && seen)
