@@ -37,8 +37,10 @@ pub(crate) trait Engine {
 /// The engine that a configuration describes.
 pub(crate) fn engine(config: &Config) -> Result<Box<dyn Engine>, PipelineError> {
     let rule = match config.filter.estimator {
+        Estimator::Auto => Rule::ByBend,
         Estimator::Unscented => Rule::Unscented,
-        _ => Rule::Extended,
+        // Particles need no rule.
+        Estimator::Kalman | Estimator::Extended | Estimator::Particle => Rule::Extended,
     };
     match (&config.motion, config.motion.labels().len()) {
         (MotionConfig::Switching(switching), 4) => {
@@ -80,7 +82,9 @@ fn with_single<const N: usize>(
             }
             with_tracker::<N, _>(Cloud { motion, count, seed: config.filter.seed }, config)
         }
-        _ => with_tracker::<N, _>(Single { motion, rule }, config),
+        Estimator::Auto | Estimator::Kalman | Estimator::Extended | Estimator::Unscented => {
+            with_tracker::<N, _>(Single { motion, rule }, config)
+        }
     }
 }
 
@@ -126,18 +130,28 @@ where
     fn run<const M: usize>(
         &mut self,
         sensor: &dyn Sensor<N, M>,
+        bent: bool,
         station: &Station,
         scan: &Scan,
         measurements: &[Measurement<M>],
     ) -> Result<Outcome, PipelineError> {
         let tracker = &mut self.tracker;
         self.recursion
-            .with(sensor, |filter| {
+            .with(sensor, bent, |filter| {
                 let numbers: Vec<usize> = (0..measurements.len()).collect();
                 follow(tracker, &Numbered { filter, measurements }, station, scan, &numbers)
             })
             .map_err(|error| PipelineError::parameter("motion", &error))?
     }
+}
+
+/// Whether, of ranges and bearings, one is bent: over an error of the bearing the arc of its range leaves the tangent by as much
+/// as an error of the range, and a first-order filter takes the one for the other.
+fn bent<const N: usize, const M: usize>(sensor: &dyn Sensor<N, M>, seen: &[Measurement<M>]) -> bool {
+    seen.iter().any(|measurement| {
+        let noise = measurement.noise.unwrap_or_else(|| sensor.noise(&measurement.value));
+        measurement.value[0] * noise[(1, 1)] > noise[(0, 0)].sqrt()
+    })
 }
 
 /// Takes in one scan, whose measurements the filter knows by their numbers.
@@ -169,11 +183,17 @@ where
 {
     fn step(&mut self, station: &Station, scan: &Scan) -> Result<Outcome, PipelineError> {
         match &station.kind {
-            Kind::Position(sensor) => self.run(sensor, station, scan, &sensors::positions(scan)?),
-            Kind::Converted(sensor) => self.run(sensor, station, scan, &sensors::ranges(scan)?),
-            Kind::RangeBearing(sensor) => self.run(sensor, station, scan, &sensors::ranges(scan)?),
-            Kind::RangeBearingRate(sensor) => self.run(sensor, station, scan, &sensors::range_rates(scan)?),
-            Kind::Bearing(sensor) => self.run(sensor, station, scan, &sensors::bearings(scan)?),
+            Kind::Position(sensor) => self.run(sensor, false, station, scan, &sensors::positions(scan)?),
+            Kind::Converted(sensor) => self.run(sensor, false, station, scan, &sensors::ranges(scan)?),
+            Kind::RangeBearing(sensor) => {
+                let seen = sensors::ranges(scan)?;
+                self.run(sensor, bent::<N, 2>(sensor, &seen), station, scan, &seen)
+            }
+            Kind::RangeBearingRate(sensor) => {
+                let seen = sensors::range_rates(scan)?;
+                self.run(sensor, bent::<N, 3>(sensor, &seen), station, scan, &seen)
+            }
+            Kind::Bearing(sensor) => self.run(sensor, true, station, scan, &sensors::bearings(scan)?),
         }
     }
 
@@ -235,7 +255,7 @@ fn modes<const N: usize>(
     // Building the filter once, for any sensor, finds what is wrong with it before the first scan.
     let probe: tercel_core::sensor::Position<2> = tercel_core::sensor::Position::new(1.0)
         .map_err(|error| PipelineError::parameter("motion.switching", &error))?;
-    switching.filter(&probe).map_err(|error| PipelineError::parameter("motion.switching", &error))?;
+    switching.filter(&probe, false).map_err(|error| PipelineError::parameter("motion.switching", &error))?;
     Ok(switching)
 }
 

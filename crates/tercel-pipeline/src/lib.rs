@@ -34,6 +34,7 @@ mod learned;
 mod numbered;
 mod pipeline;
 mod reorder;
+mod repeats;
 mod sensors;
 
 pub use config::Config;

@@ -9,6 +9,7 @@ use crate::PipelineError;
 use crate::config::{Config, OutOfOrder};
 use crate::engine::{Engine, Outcome, engine};
 use crate::reorder::Reorder;
+use crate::repeats;
 use crate::sensors::Station;
 
 /// The tracker that a configuration describes. See the [crate] for an example.
@@ -41,6 +42,8 @@ pub struct Summary {
     pub starts: u64,
     /// Detections that were counted as clutter.
     pub clutter: u64,
+    /// Detections that were left out because their scan holds another with the same numbers and the same identity.
+    pub repeated: u64,
     /// Tracks that were confirmed.
     pub confirmed: u64,
 }
@@ -132,9 +135,14 @@ impl Pipeline {
         let name = self.station(scan)?;
         let Some(station) = self.stations.get_mut(&name) else { return Ok(Vec::new()) };
         station.move_to(scan);
+        let single = repeats::left_out(scan);
+        let repeated =
+            single.as_ref().map_or(0, |single| scan.detections.len() - single.detections.len()) as u64;
+        let scan = single.as_ref().unwrap_or(scan);
         let outcome = self.engine.step(station, scan)?;
         learn(station, &outcome);
         self.count(&outcome);
+        self.summary.repeated += repeated;
         Ok(outcome.rows)
     }
 
