@@ -99,26 +99,36 @@ impl Crowd {
     }
 }
 
-#[test]
-fn print_all() {
-    for room in [120.0, 80.0, 60.0, 50.0] {
-        let crowd = Crowd::new(room);
-        let mut p = |n: &str, f: &dyn Fn() -> (usize, usize)| {
-            let t = std::time::Instant::now();
-            let r = f();
-            println!("{room} {n}: {r:?} {:?} ms/scan", t.elapsed().as_millis() as f64 / SCANS as f64);
-        };
-        p("nn", &|| crowd.follow(NearestNeighbour::new(NearestNeighbourConfig::default()).unwrap()));
-        p("jpda", &|| crowd.follow(Jpda::new(JpdaConfig::default()).unwrap()));
-        p("phd", &|| crowd.follow(Phd::new(PhdConfig::default()).unwrap()));
-        p("phd10000", &|| crowd.follow(Phd::new(PhdConfig { cap: 10000, ..PhdConfig::default() }).unwrap()));
-        p("mb", &|| crowd.follow(MultiBernoulli::new(MultiBernoulliConfig::default()).unwrap()));
-        p("mb10000", &|| {
-            crowd.follow(
-                MultiBernoulli::new(MultiBernoulliConfig { cap: 10000, ..MultiBernoulliConfig::default() })
-                    .unwrap(),
-            )
-        });
-        p("pmbm", &|| crowd.follow(Pmbm::new(PmbmConfig::default()).unwrap()));
+/// Follows a crowd with a square of 120, 80 and 60 m for each object, and demands that so many are found.
+fn check<T: Tracker<Belief = Gaussian<4>>>(least: [usize; 3], make: impl Fn() -> T) {
+    for (room, least) in [120.0, 80.0, 60.0].into_iter().zip(least) {
+        let (found, others) = Crowd::new(room).follow(make());
+        assert!(found >= least, "{room} m: {found} of {OBJECTS} found");
+        assert!(others <= OBJECTS / 10, "{room} m: {others} tracks of nothing");
     }
+}
+
+#[test]
+fn nearest_neighbour_starts_in_a_crowd() {
+    check([290, 290, 250], || NearestNeighbour::new(NearestNeighbourConfig::default()).unwrap());
+}
+
+#[test]
+fn jpda_starts_in_a_crowd() {
+    check([290, 290, 250], || Jpda::new(JpdaConfig::default()).unwrap());
+}
+
+#[test]
+fn pmbm_starts_in_a_crowd() {
+    check([290, 270, 200], || Pmbm::new(PmbmConfig::default()).unwrap());
+}
+
+#[test]
+fn multi_bernoulli_starts_in_a_crowd() {
+    check([290, 270, 250], || MultiBernoulli::new(MultiBernoulliConfig::default()).unwrap());
+}
+
+#[test]
+fn phd_starts_in_a_crowd() {
+    check([290, 250, 150], || Phd::new(PhdConfig::default()).unwrap());
 }

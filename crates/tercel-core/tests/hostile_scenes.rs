@@ -85,7 +85,7 @@ fn extremes() -> Vec<Scene> {
     let mut clutter = Radar::new();
     vec![
         scene("no objects at all", 0..=0, radar(0.9, 10.0), every_second(40, |_| Plots::new())),
-        scene("only clutter", 0..=1, radar(0.9, 60.0), every_second(20, |_| clutter.anywhere(60))),
+        scene("only clutter", 0..=2, radar(0.9, 60.0), every_second(20, |_| clutter.anywhere(60))),
         scene("a thousand births a scan", 0..=2 * CAP, radar(0.9, 10.0), {
             every_second(5, |_| clutter.anywhere(1000))
         }),

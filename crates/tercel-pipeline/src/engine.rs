@@ -39,8 +39,10 @@ pub(crate) trait Engine {
 /// The engine that a configuration describes.
 pub(crate) fn engine(config: &Config) -> Result<Box<dyn Engine>, PipelineError> {
     let rule = match config.filter.estimator {
+        Estimator::Auto => Rule::ByBend,
         Estimator::Unscented => Rule::Unscented,
-        _ => Rule::Extended,
+        // Particles need no rule.
+        Estimator::Kalman | Estimator::Extended | Estimator::Particle => Rule::Extended,
     };
     match (&config.motion, config.motion.labels().len()) {
         (MotionConfig::Switching(switching), 4) => {
@@ -82,7 +84,9 @@ fn with_single<const N: usize>(
             }
             with_tracker::<N, _>(Cloud { motion, count, seed: config.filter.seed }, config)
         }
-        _ => with_tracker::<N, _>(Single { motion, rule }, config),
+        Estimator::Auto | Estimator::Kalman | Estimator::Extended | Estimator::Unscented => {
+            with_tracker::<N, _>(Single { motion, rule }, config)
+        }
     }
 }
 
@@ -130,6 +134,7 @@ where
     fn run<const M: usize>(
         &mut self,
         sensor: &dyn Sensor<N, M>,
+        bent: bool,
         measurements: &[Measurement<M>],
         (station, look, names): (&Station, &Look, &mut Names),
     ) -> Result<Outcome, PipelineError> {
@@ -141,13 +146,22 @@ where
         let numbers: Vec<Named<usize>> = look.scan.detections.iter().enumerate().map(named).collect();
         let unusable = |error| PipelineError::parameter("motion", &error);
         self.recursion
-            .with(sensor, |filter| {
+            .with(sensor, bent, |filter| {
                 let filter = Identified::new(Numbered { filter, measurements }, station.reliability)
                     .map_err(unusable)?;
                 follow(tracker, &filter, (station, look, names), &numbers)
             })
             .map_err(unusable)?
     }
+}
+
+/// Whether, of ranges and bearings, one is bent: over an error of the bearing the arc of its range leaves the tangent by as much
+/// as an error of the range, and a first-order filter takes the one for the other.
+fn bent<const N: usize, const M: usize>(sensor: &dyn Sensor<N, M>, seen: &[Measurement<M>]) -> bool {
+    seen.iter().any(|measurement| {
+        let noise = measurement.noise.unwrap_or_else(|| sensor.noise(&measurement.value));
+        measurement.value[0] * noise[(1, 1)] > noise[(0, 0)].sqrt()
+    })
 }
 
 /// A filter whose measurements are those of one scan, by number and name.
@@ -193,11 +207,17 @@ where
         let scan = &look.scan;
         let with = (station, look, names);
         match &station.kind {
-            Kind::Position(sensor) => self.run(sensor, &sensors::positions(scan)?, with),
-            Kind::Converted(sensor) => self.run(sensor, &sensors::ranges(station, scan)?, with),
-            Kind::RangeBearing(sensor) => self.run(sensor, &sensors::ranges(station, scan)?, with),
-            Kind::RangeBearingRate(sensor) => self.run(sensor, &sensors::range_rates(station, scan)?, with),
-            Kind::Bearing(sensor) => self.run(sensor, &sensors::bearings(scan)?, with),
+            Kind::Position(sensor) => self.run(sensor, false, &sensors::positions(scan)?, with),
+            Kind::Converted(sensor) => self.run(sensor, false, &sensors::ranges(station, scan)?, with),
+            Kind::RangeBearing(sensor) => {
+                let seen = sensors::ranges(station, scan)?;
+                self.run(sensor, bent::<N, 2>(sensor, &seen), &seen, with)
+            }
+            Kind::RangeBearingRate(sensor) => {
+                let seen = sensors::range_rates(station, scan)?;
+                self.run(sensor, bent::<N, 3>(sensor, &seen), &seen, with)
+            }
+            Kind::Bearing(sensor) => self.run(sensor, true, &sensors::bearings(scan)?, with),
         }
     }
 
@@ -258,7 +278,7 @@ fn modes<const N: usize>(
     // Building the filter once, for any sensor, finds what is wrong with it before the first scan.
     let probe: tercel_core::sensor::Position<2> = tercel_core::sensor::Position::new(1.0)
         .map_err(|error| PipelineError::parameter("motion.switching", &error))?;
-    switching.filter(&probe).map_err(|error| PipelineError::parameter("motion.switching", &error))?;
+    switching.filter(&probe, false).map_err(|error| PipelineError::parameter("motion.switching", &error))?;
     Ok(switching)
 }
 

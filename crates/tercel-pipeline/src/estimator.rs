@@ -15,13 +15,14 @@ pub(crate) trait Recursion<const N: usize> {
     /// What is known of one object.
     type Belief: Clone;
 
-    /// Runs `work` with the filter for this sensor.
+    /// Runs `work` with the filter for this sensor, whose measurements may be bent: see [`Rule::ByBend`].
     ///
     /// # Errors
     /// When the parameters make no filter; this does not depend on the sensor.
     fn with<const M: usize, R>(
         &self,
         sensor: &dyn Sensor<N, M>,
+        bent: bool,
         work: impl FnOnce(&dyn Filter<N, Belief = Self::Belief, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError>;
 
@@ -36,7 +37,20 @@ pub(crate) trait Recursion<const N: usize> {
 pub(crate) enum Rule {
     /// Linearised at the mean; for linear motion and sensors this is the Kalman filter.
     Extended,
+    /// By sigma points.
     Unscented,
+    /// Unscented where the measurements of the scan are bent over the width of their errors, extended elsewhere.
+    ByBend,
+}
+
+impl Rule {
+    fn takes_sigma_points(self, bent: bool) -> bool {
+        match self {
+            Rule::Extended => false,
+            Rule::Unscented => true,
+            Rule::ByBend => bent,
+        }
+    }
 }
 
 /// One model of motion.
@@ -51,11 +65,13 @@ impl<const N: usize> Recursion<N> for Single<N> {
     fn with<const M: usize, R>(
         &self,
         sensor: &dyn Sensor<N, M>,
+        bent: bool,
         work: impl FnOnce(&dyn Filter<N, Belief = Gaussian<N>, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError> {
-        Ok(match self.rule {
-            Rule::Extended => work(&Extended::<_, _, M>::new(&*self.motion, sensor)),
-            Rule::Unscented => work(&Unscented::<_, _, M>::new(&*self.motion, sensor)),
+        Ok(if self.rule.takes_sigma_points(bent) {
+            work(&Unscented::<_, _, M>::new(&*self.motion, sensor))
+        } else {
+            work(&Extended::<_, _, M>::new(&*self.motion, sensor))
         })
     }
 }
@@ -76,6 +92,7 @@ impl<const N: usize> Recursion<N> for Cloud<N> {
     fn with<const M: usize, R>(
         &self,
         sensor: &dyn Sensor<N, M>,
+        _: bool,
         work: impl FnOnce(&dyn Filter<N, Belief = Particles<N>, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError> {
         let filter = Particle::<_, _, M>::new(&*self.motion, sensor, self.count, self.seed)?;
@@ -108,14 +125,15 @@ impl<const N: usize> Switching<N> {
     pub fn filter<'a, const M: usize>(
         &'a self,
         sensor: &'a dyn Sensor<N, M>,
+        bent: bool,
     ) -> Result<Imm<AnyFilter<'a, N, M>>, FilterError> {
         let modes: Result<Vec<AnyFilter<'a, N, M>>, FilterError> = self
             .modes
             .iter()
             .map(|mode| match mode {
-                Mode::Whole(motion) => Ok(gaussian(self.rule, &**motion, sensor)),
-                Mode::Positions(motion) => self.padded::<2, M>(&**motion, sensor),
-                Mode::Velocities(motion) => self.padded::<4, M>(&**motion, sensor),
+                Mode::Whole(motion) => Ok(gaussian(self.rule.takes_sigma_points(bent), &**motion, sensor)),
+                Mode::Positions(motion) => self.padded::<2, M>(&**motion, sensor, bent),
+                Mode::Velocities(motion) => self.padded::<4, M>(&**motion, sensor, bent),
             })
             .collect();
         Imm::new(modes?, self.transition.clone())
@@ -125,21 +143,23 @@ impl<const N: usize> Switching<N> {
         &'a self,
         motion: &'a dyn Motion<K>,
         sensor: &'a dyn Sensor<N, M>,
+        bent: bool,
     ) -> Result<AnyFilter<'a, N, M>, FilterError> {
-        let part = gaussian::<K, M>(self.rule, motion, Shortened { sensor });
+        let part = gaussian::<K, M>(self.rule.takes_sigma_points(bent), motion, Shortened { sensor });
         Ok(Box::new(Padded::<_, K>::new(part, self.missing)?))
     }
 }
 
 /// A filter with a Gaussian belief.
 fn gaussian<'a, const N: usize, const M: usize>(
-    rule: Rule,
+    sigma_points: bool,
     motion: &'a dyn Motion<N>,
     sensor: impl Sensor<N, M> + 'a,
 ) -> AnyFilter<'a, N, M> {
-    match rule {
-        Rule::Extended => Box::new(Extended::<_, _, M>::new(motion, sensor)),
-        Rule::Unscented => Box::new(Unscented::<_, _, M>::new(motion, sensor)),
+    if sigma_points {
+        Box::new(Unscented::<_, _, M>::new(motion, sensor))
+    } else {
+        Box::new(Extended::<_, _, M>::new(motion, sensor))
     }
 }
 
@@ -149,9 +169,10 @@ impl<const N: usize> Recursion<N> for Switching<N> {
     fn with<const M: usize, R>(
         &self,
         sensor: &dyn Sensor<N, M>,
+        bent: bool,
         work: impl FnOnce(&dyn Filter<N, Belief = Self::Belief, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError> {
-        Ok(work(&self.filter(sensor)?))
+        Ok(work(&self.filter(sensor, bent)?))
     }
 
     fn modes(&self) -> Vec<String> {

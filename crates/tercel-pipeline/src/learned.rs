@@ -94,6 +94,7 @@ impl Recursion<4> for Liquid {
     fn with<const M: usize, R>(
         &self,
         sensor: &dyn Sensor<4, M>,
+        _: bool,
         work: impl FnOnce(&dyn Filter<4, Belief = LiquidBelief, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError> {
         let filter = LiquidKalman::<_, M>::new(Arc::clone(&self.network), sensor);
@@ -107,6 +108,7 @@ impl Recursion<4> for Bank {
     fn with<const M: usize, R>(
         &self,
         sensor: &dyn Sensor<4, M>,
+        _: bool,
         work: impl FnOnce(&dyn Filter<4, Belief = NeuralImmBelief, Measurement = Measurement<M>>) -> R,
     ) -> Result<R, FilterError> {
         let filter = NeuralImm::<_, M>::new(Arc::clone(&self.network), &[sensor])?;

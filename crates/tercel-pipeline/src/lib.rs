@@ -38,6 +38,7 @@ mod notice;
 mod numbered;
 mod pipeline;
 mod reorder;
+mod repeats;
 mod sensors;
 mod slant;
 mod turns;

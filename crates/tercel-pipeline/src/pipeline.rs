@@ -1,10 +1,10 @@
 //! Scans in, tracks out.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use tercel_core::multi::{Clutter, Status, Use};
-use tercel_data::table::{Description, Detection, Scan, Track};
+use tercel_data::table::{Description, Scan, Track};
 
 use crate::PipelineError;
 use crate::config::{ClockSetBack, Config, OutOfOrder};
@@ -12,6 +12,7 @@ use crate::engine::{Engine, Outcome, engine};
 use crate::names::Names;
 use crate::notice::Notice;
 use crate::reorder::{Arrival, Order, Reorder};
+use crate::repeats;
 use crate::sensors::Station;
 use crate::turns::{Look, Turns};
 use crate::understood;
@@ -58,6 +59,8 @@ pub struct Summary {
     pub starts: u64,
     /// Detections that were counted as clutter.
     pub clutter: u64,
+    /// Detections that were left out because their scan holds another with the same numbers and the same identity.
+    pub repeated: u64,
     /// Tracks that were confirmed.
     pub confirmed: u64,
 }
@@ -248,19 +251,22 @@ impl Pipeline {
     fn track(&mut self, look: &Look) -> Result<Vec<Track>, PipelineError> {
         let Some(station) = self.stations.get_mut(&look.scan.sensor) else { return Ok(Vec::new()) };
         station.move_to(&look.scan);
-        // An object that reports twice at one time is one object: the second report is taken after the first.
-        let again = if station.detection.is_reports() { repeated(&look.scan) } else { Vec::new() };
-        if again.is_empty() {
-            return self.step(look);
+        let reports = station.detection.is_reports();
+        if let Some(single) = repeats::left_out(&look.scan) {
+            self.summary.repeated += (look.scan.detections.len() - single.detections.len()) as u64;
+            return self.take(&Look { scan: single, sector: look.sector }, reports);
         }
-        let (mut first, mut second) = (look.clone(), look.clone());
-        let mut number = 0..;
-        first.scan.detections.retain(|_| number.next().is_some_and(|number| !again.contains(&number)));
-        second.scan.detections = again.iter().map(|&number| look.scan.detections[number].clone()).collect();
-        let mut rows = self.step(&first)?;
-        let later = self.track(&second)?;
-        self.summary.scans -= 1;
-        rows.extend(later);
+        self.take(look, reports)
+    }
+
+    /// Tracks a scan. An object that reports twice at one time is one object: its second report is taken after the first.
+    fn take(&mut self, look: &Look, reports: bool) -> Result<Vec<Track>, PipelineError> {
+        let Some([first, again]) = reports.then(|| repeats::named_again(&look.scan)).flatten() else {
+            self.summary.scans += 1;
+            return self.step(look);
+        };
+        let mut rows = self.step(&Look { scan: first, sector: look.sector })?;
+        rows.extend(self.take(&Look { scan: again, sector: look.sector }, reports)?);
         Ok(rows)
     }
 
@@ -298,7 +304,6 @@ impl Pipeline {
         }
         let summary = &mut self.summary;
         summary.confirmed = self.confirmed.len() as u64;
-        summary.scans += 1;
         for (_, used) in &outcome.uses {
             match used {
                 Use::Updated(_) => summary.updates += 1,
@@ -312,19 +317,6 @@ impl Pipeline {
 /// Rows of a scan in a table.
 pub(crate) fn rows(scan: &Scan) -> u64 {
     scan.detections.len().max(1) as u64
-}
-
-/// Which detections name an object that another one before them names, by their numbers.
-fn repeated(scan: &Scan) -> Vec<usize> {
-    if scan.detections.len() < 2 {
-        return Vec::new();
-    }
-    let mut seen = HashSet::with_capacity(scan.detections.len());
-    let named = |(number, detection): (usize, &Detection)| {
-        let name = detection.identity.as_ref()?;
-        (!seen.insert(Arc::clone(name))).then_some(number)
-    };
-    scan.detections.iter().enumerate().filter_map(named).collect()
 }
 
 /// Teaches the clutter map of a sensor with its detections, each in the measure in which no track explains it.

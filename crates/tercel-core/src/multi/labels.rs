@@ -33,6 +33,8 @@ struct Group {
     lead: usize,
     members: Vec<usize>,
     weight: f64,
+    /// The part of the weight that a measurement of this scan updated.
+    detected: f64,
 }
 
 /// A group stands for one object; another half of one is more than two missed and detected versions add up to.
@@ -51,9 +53,28 @@ impl<B> Default for Roster<B> {
 }
 
 impl<B: Clone> Roster<B> {
-    /// Forgets the tracks that were deleted in the last scan.
-    pub fn begin(&mut self) {
+    /// Forgets the tracks that were deleted in the last scan, and lets time pass.
+    pub fn begin(&mut self, dt: f64) {
         self.tracks.retain(|track| track.status != Status::Deleted);
+        self.tracks.iter_mut().for_each(|track| track.wait(dt));
+    }
+
+    /// Raises the weights of each label, where they add up to less than its track exists at the least: see [`Management`].
+    pub fn hold<'a>(
+        &self,
+        weights: impl Iterator<Item = (TrackId, &'a mut f64)>,
+        (time, survival): (f64, f64),
+    ) {
+        let mut labels: BTreeMap<TrackId, Vec<&mut f64>> = BTreeMap::new();
+        weights.for_each(|(label, weight)| labels.entry(label).or_default().push(weight));
+        for track in &self.tracks {
+            let Some(weights) = labels.get_mut(&track.id) else { continue };
+            let sum: f64 = weights.iter().map(|weight| **weight).sum();
+            let least = Management::least(track, time, survival);
+            if sum > 0.0 && sum < least {
+                weights.iter_mut().for_each(|weight| **weight *= least / sum);
+            }
+        }
     }
 
     fn fresh(&mut self) -> TrackId {
@@ -77,8 +98,9 @@ impl<B: Clone> Roster<B> {
     }
 
     /// Reads the tracks off terms that are sorted by falling weight. Terms of one label that lie together are one object:
-    /// its existence is the sum of their weights, its belief their merger, and it was seen when the sum reaches
-    /// `extract`. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
+    /// its existence is the sum of their weights, its belief their merger. It was seen when the sum reaches
+    /// `extract`. A tentative track of less weight was not missed as long as it is more likely seen than not, if it is there at
+    /// all. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
     /// a track is marked; the others count as clutter. A track that is gone is reported where it would be now, after a time `dt`.
     pub fn read<const N: usize, F>(
         &mut self,
@@ -137,11 +159,13 @@ impl<B: Clone> Roster<B> {
         let (track, lead) = (&mut self.tracks[at], &terms[group.lead]);
         track.existence = group.weight.min(1.0);
         track.belief = group.belief(filter, terms);
+        let grows = !track.confirmed && group.detected >= 0.5 * group.weight;
         match lead.tag.measurement {
             Some(number) if group.weight >= extract => {
                 track.hit(number, time);
                 track.reports = !lead.tag.in_view;
             }
+            Some(_) if grows => track.unseen(),
             _ if lead.tag.in_view => track.miss(),
             _ => track.unseen(),
         }
@@ -201,6 +225,7 @@ where
     };
     for (number, term) in terms.iter().enumerate() {
         let groups = all.entry(term.tag.id).or_default();
+        let detected = if term.tag.measurement.is_some() { term.weight } else { 0.0 };
         let home = groups
             .iter_mut()
             .find(|group| group.weight + term.weight <= FULL && together(group.lead, number));
@@ -208,8 +233,9 @@ where
             Some(group) => {
                 group.members.push(number);
                 group.weight += term.weight;
+                group.detected += detected;
             }
-            None => groups.push(Group { lead: number, members: vec![number], weight: term.weight }),
+            None => groups.push(Group { lead: number, members: vec![number], weight: term.weight, detected }),
         }
     }
     all

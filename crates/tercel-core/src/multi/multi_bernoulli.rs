@@ -100,7 +100,7 @@ impl Default for MultiBernoulliConfig {
             birth: 0.05,
             prune: 1e-3,
             merge: 4.0,
-            cap: 500,
+            cap: 10_000,
             beliefs: 20,
             extract: 0.5,
             management: super::PhdConfig::default().management,
@@ -238,7 +238,7 @@ impl<B: Clone> MultiBernoulli<B> {
     }
 
     /// Adds the measured objects to the legacy ones, and drops what hardly exists.
-    fn collect<const N: usize, F>(&mut self, filter: &F)
+    fn collect<const N: usize, F>(&mut self, filter: &F, time: f64)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
@@ -258,6 +258,8 @@ impl<B: Clone> MultiBernoulli<B> {
             let label = Label { measurement: Some(number), ..label };
             self.objects.push(Bernoulli { existence, label, beliefs: pool.beliefs });
         }
+        let weights = self.objects.iter_mut().map(|object| (object.label.id, &mut object.existence));
+        self.roster.hold(weights, (time, self.config.survival));
         let (prune, merge, cap) = (self.config.prune, self.config.merge, self.config.beliefs);
         self.objects.retain(|object| object.existence > prune && !object.beliefs.is_empty());
         for object in &mut self.objects {
@@ -349,11 +351,11 @@ impl<B: Clone> Tracker for MultiBernoulli<B> {
     {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.roster.begin();
+        self.roster.begin(dt);
         self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.predict(filter, dt);
         self.contribute(filter, scan);
-        self.collect(filter);
+        self.collect(filter, scan.time);
         self.label(filter, scan, dt);
         self.birth(filter, scan);
         self.time = Some(scan.time);

@@ -96,7 +96,7 @@ impl Default for PhdConfig {
             birth: 0.05,
             prune: 1e-5,
             merge: 4.0,
-            cap: 500,
+            cap: 10_000,
             extract: 0.5,
             management: Management {
                 confirm: super::Confirmation::Hits { hits: 3, scans: 4 },
@@ -203,6 +203,8 @@ impl<B: Clone> Phd<B> {
             }
         }
         self.terms.append(children);
+        let weights = self.terms.iter_mut().map(|term| (term.tag.id, &mut term.weight));
+        self.roster.hold(weights, (scan.time, self.config.survival));
         self.terms.retain(|term| term.weight > self.config.prune);
     }
 
@@ -252,7 +254,7 @@ impl<B: Clone> Tracker for Phd<B> {
     {
         let dt = error::step(scan.time, self.time)?;
         let places = places(filter, scan)?;
-        self.roster.begin();
+        self.roster.begin(dt);
         self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
         self.predict(filter, dt);
         self.update(filter, scan);

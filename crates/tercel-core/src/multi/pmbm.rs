@@ -92,10 +92,12 @@ pub struct PmbmConfig {
     pub gate: Gate,
     /// Probability that an object survives one second.
     pub survival: f64,
-    /// Expected objects per m² before the first scan.
-    pub undetected: f64,
-    /// Expected new objects per m² and second.
-    pub birth: f64,
+    /// Expected objects per m² before the first scan. `None` stands for as many as there are false measurements, and for no fewer
+    /// than 1e-6: so an unexplained measurement of the first scan is an object or clutter with equal probability.
+    pub undetected: Option<f64>,
+    /// Expected new objects per m² and second. `None` stands for one to a thousand false measurements, and for no
+    /// fewer than 1e-8.
+    pub birth: Option<f64>,
     /// Largest number of hypotheses of a cluster.
     pub hypotheses: usize,
     /// Hypotheses of a lower weight are dropped, and pairs that explain a measurement with a lower probability.
@@ -114,12 +116,12 @@ impl Default for PmbmConfig {
         PmbmConfig {
             gate: Gate::default(),
             survival: 0.99,
-            undetected: 1e-6,
-            birth: 1e-8,
+            undetected: None,
+            birth: None,
             hypotheses: 100,
             prune: 1e-4,
             merge: 0.5,
-            cap: 1000,
+            cap: 10_000,
             management: Management {
                 confirm: Confirmation::Existence(0.95),
                 min_existence: 1e-4,
@@ -188,6 +190,18 @@ impl<B: Clone> Pmbm<B> {
         }
         filter.predict_all(&mut beliefs, dt);
         self.undetected.predict(dt);
+    }
+
+    /// Says for each tree how far existence may sink in this scan: management ends confirmed tracks by counting misses.
+    fn hold(&mut self, time: f64) {
+        let PmbmConfig { management, survival, .. } = &self.config;
+        for tree in self.clusters.iter_mut().flat_map(|cluster| &mut cluster.trees) {
+            let Ok(at) = self.tracks.binary_search_by_key(&tree.label, |track| track.id) else { continue };
+            let track = &self.tracks[at];
+            tree.missed = Management::least(track, time, *survival);
+            let ends = management.ends_by_existence(track.confirmed);
+            tree.least = if ends { management.min_existence } else { 0.0 };
+        }
     }
 
     /// Reads the tracks off the trees; those that management gives up take their trees with them. A track of which nothing is left
@@ -269,7 +283,9 @@ impl<B: Clone> Tracker for Pmbm<B> {
         let places = places(filter, scan)?;
         self.tracks.retain(|track| track.status != Status::Deleted);
         self.scratch.vicinity.build(filter, scan, &self.config.gate, &places);
+        self.tracks.iter_mut().for_each(|track| track.wait(dt));
         self.predict(filter, dt);
+        self.hold(scan.time);
         self.update(filter, scan, &places);
         // That nobody reported says nothing of those who were never seen.
         if !scan.detection.is_reports() {

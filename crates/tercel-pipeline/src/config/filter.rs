@@ -26,7 +26,8 @@ pub struct FilterConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimator {
-    /// Kalman where motion and sensors are linear, extended elsewhere.
+    /// Kalman where motion and sensors are linear; unscented for bearings alone, and for ranges and bearings where the arc of a
+    /// bearing's error leaves its tangent by as much as the error of the range; extended elsewhere.
     #[default]
     Auto,
     /// Kalman filter: linear motion, sensors of positions or converted polar ones.
@@ -72,10 +73,14 @@ impl FilterConfig {
                 ))
             }
             (Estimator::Particle, _) => Ok(()),
-            _ if self.particles.is_some() => {
-                Err(PipelineError::config("filter.particles", "needs filter.estimator = \"particle\""))
+            (Estimator::Auto | Estimator::Kalman | Estimator::Extended | Estimator::Unscented, _) => {
+                let idle = match (self.particles, self.seed) {
+                    (Some(_), _) => "filter.particles",
+                    (None, 0) => return Ok(()),
+                    (None, _) => "filter.seed",
+                };
+                Err(PipelineError::config(idle, "needs filter.estimator = \"particle\""))
             }
-            _ => Ok(()),
         }
     }
 }

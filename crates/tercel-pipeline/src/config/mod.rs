@@ -3,6 +3,7 @@
 //! Every key has a default except the motion and the sensors; `schema` prints them all with units and ranges.
 
 mod filter;
+mod management;
 mod motion;
 mod number;
 pub mod presets;
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::PipelineError;
 
 pub use filter::{Estimator, FilterConfig};
+pub use management::{ConfirmConfig, HitsConfig, ManagementConfig};
 pub use motion::{AccelerationModel, LearnedMotion, MotionConfig, Singer, Switching, TurnModel};
 pub use number::{Count, NonNegative, Positive, Probability};
 pub use sensor::{
@@ -25,7 +27,7 @@ pub use sensor::{
     SensorConfig, SensorKind, TurnConfig, UniformClutter,
 };
 pub use tracker::{
-    ConfirmConfig, HitsConfig, ManagementConfig, NearestNeighbourConfig, PhdConfig, TrackerConfig,
+    JpdaConfig, MultiBernoulliConfig, NearestNeighbourConfig, PhdConfig, PmbmConfig, TrackerConfig,
 };
 
 /// A whole configuration file.

@@ -95,3 +95,10 @@ constant!(Probability, f64);
 constant!(Positive, f64);
 constant!(NonNegative, f64);
 constant!(Count, u32);
+
+impl Count {
+    /// A default of the library.
+    pub(super) fn of(value: usize) -> Self {
+        Count(value as u32)
+    }
+}

@@ -1,4 +1,4 @@
-//! The tracker section.
+//! The tracker section. Every default is that of the library.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,6 +6,7 @@ use tercel_core::association::Gate;
 use tercel_core::error::FilterError;
 use tercel_core::multi;
 
+use super::management::{Managed, ManagementConfig, ManagementKeys, over};
 use super::{Count, NonNegative, Positive, Probability};
 
 /// How objects are found among the detections.
@@ -50,19 +51,28 @@ pub struct NearestNeighbourConfig {
     #[schemars(extend("x-unit" = "1"))]
     pub cap: Count,
     /// When tracks are confirmed and given up.
+    #[serde(deserialize_with = "over::<NearestNeighbourConfig, _>")]
+    #[schemars(with = "ManagementKeys")]
     pub management: ManagementConfig,
 }
 
 impl Default for NearestNeighbourConfig {
     fn default() -> Self {
+        let library = multi::NearestNeighbourConfig::default();
         NearestNeighbourConfig {
-            gate: Probability::constant(0.999),
-            survival: Probability::constant(0.99),
-            birth: Probability::constant(0.1),
-            merge: NonNegative::constant(0.5),
-            cap: Count::constant(100_000),
-            management: ManagementConfig::default(),
+            gate: Probability::constant(library.gate.probability()),
+            survival: Probability::constant(library.survival),
+            birth: Probability::constant(library.birth),
+            merge: NonNegative::constant(library.merge),
+            cap: Count::of(library.cap),
+            management: ManagementConfig::of(&library.management),
         }
+    }
+}
+
+impl Managed for NearestNeighbourConfig {
+    fn management(self) -> ManagementConfig {
+        self.management
     }
 }
 
@@ -105,29 +115,30 @@ pub struct PhdConfig {
     #[schemars(extend("x-unit" = "1"))]
     pub extract: Positive,
     /// When tracks are confirmed and given up.
+    #[serde(deserialize_with = "over::<PhdConfig, _>")]
+    #[schemars(with = "ManagementKeys")]
     pub management: ManagementConfig,
 }
 
 impl Default for PhdConfig {
     fn default() -> Self {
+        let library = multi::PhdConfig::default();
         PhdConfig {
-            gate: Probability::constant(0.999),
-            survival: Probability::constant(0.99),
-            birth: Probability::constant(0.05),
-            prune: Probability::constant(1e-5),
-            merge: NonNegative::constant(4.0),
-            cap: Count::constant(500),
-            extract: Positive::constant(0.5),
-            management: ManagementConfig {
-                confirm: ConfirmConfig::Hits(HitsConfig {
-                    hits: Count::constant(3),
-                    scans: Count::constant(4),
-                }),
-                min_existence: Probability::constant(1e-3),
-                max_misses: 2,
-                ..ManagementConfig::default()
-            },
+            gate: Probability::constant(library.gate.probability()),
+            survival: Probability::constant(library.survival),
+            birth: Probability::constant(library.birth),
+            prune: Probability::constant(library.prune),
+            merge: NonNegative::constant(library.merge),
+            cap: Count::of(library.cap),
+            extract: Positive::constant(library.extract),
+            management: ManagementConfig::of(&library.management),
         }
+    }
+}
+
+impl Managed for PhdConfig {
+    fn management(self) -> ManagementConfig {
+        self.management
     }
 }
 
@@ -175,23 +186,31 @@ pub struct MultiBernoulliConfig {
     #[schemars(extend("x-unit" = "1"))]
     pub extract: Positive,
     /// When tracks are confirmed and given up.
+    #[serde(deserialize_with = "over::<MultiBernoulliConfig, _>")]
+    #[schemars(with = "ManagementKeys")]
     pub management: ManagementConfig,
 }
 
 impl Default for MultiBernoulliConfig {
     fn default() -> Self {
-        let phd = PhdConfig::default();
+        let library = multi::MultiBernoulliConfig::default();
         MultiBernoulliConfig {
-            gate: phd.gate,
-            survival: phd.survival,
-            birth: phd.birth,
-            prune: Probability::constant(1e-3),
-            merge: phd.merge,
-            cap: phd.cap,
-            beliefs: Count::constant(20),
-            extract: phd.extract,
-            management: phd.management,
+            gate: Probability::constant(library.gate.probability()),
+            survival: Probability::constant(library.survival),
+            birth: Probability::constant(library.birth),
+            prune: Probability::constant(library.prune),
+            merge: NonNegative::constant(library.merge),
+            cap: Count::of(library.cap),
+            beliefs: Count::of(library.beliefs),
+            extract: Positive::constant(library.extract),
+            management: ManagementConfig::of(&library.management),
         }
+    }
+}
+
+impl Managed for MultiBernoulliConfig {
+    fn management(self) -> ManagementConfig {
+        self.management
     }
 }
 
@@ -231,20 +250,28 @@ pub struct JpdaConfig {
     #[schemars(extend("x-unit" = "1"))]
     pub cap: Count,
     /// When tracks are confirmed and given up.
+    #[serde(deserialize_with = "over::<JpdaConfig, _>")]
+    #[schemars(with = "ManagementKeys")]
     pub management: ManagementConfig,
 }
 
 impl Default for JpdaConfig {
     fn default() -> Self {
-        let nearest = NearestNeighbourConfig::default();
+        let library = multi::JpdaConfig::default();
         JpdaConfig {
-            gate: nearest.gate,
-            survival: nearest.survival,
-            birth: nearest.birth,
-            merge: nearest.merge,
-            cap: Count::constant(10_000),
-            management: nearest.management,
+            gate: Probability::constant(library.gate.probability()),
+            survival: Probability::constant(library.survival),
+            birth: Probability::constant(library.birth),
+            merge: NonNegative::constant(library.merge),
+            cap: Count::of(library.cap),
+            management: ManagementConfig::of(&library.management),
         }
+    }
+}
+
+impl Managed for JpdaConfig {
+    fn management(self) -> ManagementConfig {
+        self.management
     }
 }
 
@@ -271,12 +298,12 @@ pub struct PmbmConfig {
     /// Probability that an object survives one second.
     #[schemars(extend("x-unit" = "1"))]
     pub survival: Probability,
-    /// Expected objects per area before the first scan.
+    /// Expected objects per area before the first scan. Without it, as many as false detections, and no fewer than 1e-6.
     #[schemars(extend("x-unit" = "1/m^2"))]
-    pub undetected: NonNegative,
-    /// Expected new objects per area and time.
+    pub undetected: Option<NonNegative>,
+    /// Expected new objects per area and time. Without it, one to a thousand false detections, and no fewer than 1e-8.
     #[schemars(extend("x-unit" = "1/(m^2 s)"))]
-    pub birth: NonNegative,
+    pub birth: Option<NonNegative>,
     /// Largest number of hypotheses about objects that compete for detections.
     #[schemars(extend("x-unit" = "1"))]
     pub hypotheses: Count,
@@ -290,25 +317,31 @@ pub struct PmbmConfig {
     #[schemars(extend("x-unit" = "1"))]
     pub cap: Count,
     /// When tracks are confirmed and given up.
+    #[serde(deserialize_with = "over::<PmbmConfig, _>")]
+    #[schemars(with = "ManagementKeys")]
     pub management: ManagementConfig,
 }
 
 impl Default for PmbmConfig {
     fn default() -> Self {
+        let library = multi::PmbmConfig::default();
         PmbmConfig {
-            gate: Probability::constant(0.999),
-            survival: Probability::constant(0.99),
-            undetected: NonNegative::constant(1e-6),
-            birth: NonNegative::constant(1e-8),
-            hypotheses: Count::constant(100),
-            prune: Probability::constant(1e-4),
-            merge: NonNegative::constant(0.5),
-            cap: Count::constant(1000),
-            management: ManagementConfig {
-                min_existence: Probability::constant(1e-4),
-                ..ManagementConfig::default()
-            },
+            gate: Probability::constant(library.gate.probability()),
+            survival: Probability::constant(library.survival),
+            undetected: library.undetected.map(NonNegative::constant),
+            birth: library.birth.map(NonNegative::constant),
+            hypotheses: Count::of(library.hypotheses),
+            prune: Probability::constant(library.prune),
+            merge: NonNegative::constant(library.merge),
+            cap: Count::of(library.cap),
+            management: ManagementConfig::of(&library.management),
         }
+    }
+}
+
+impl Managed for PmbmConfig {
+    fn management(self) -> ManagementConfig {
+        self.management
     }
 }
 
@@ -317,79 +350,13 @@ impl PmbmConfig {
         Ok(multi::PmbmConfig {
             gate: Gate::new(self.gate.get())?,
             survival: self.survival.get(),
-            undetected: self.undetected.get(),
-            birth: self.birth.get(),
+            undetected: self.undetected.map(NonNegative::get),
+            birth: self.birth.map(NonNegative::get),
             hypotheses: self.hypotheses.get() as usize,
             prune: self.prune.get(),
             merge: self.merge.get(),
             cap: self.cap.get() as usize,
             management: self.management.build(),
         })
-    }
-}
-
-/// When tracks are confirmed and given up.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ManagementConfig {
-    /// When a tentative track is confirmed.
-    pub confirm: ConfirmConfig,
-    /// A track with a lower probability of existence is given up.
-    #[schemars(extend("x-unit" = "1"))]
-    pub min_existence: Probability,
-    /// A track with more misses in a row is given up; only scans that should have seen it count. 0 or more.
-    #[schemars(extend("x-unit" = "1"))]
-    pub max_misses: u32,
-    /// A track that no scan has updated for longer is given up.
-    #[schemars(extend("x-unit" = "s"))]
-    pub max_coast: Positive,
-}
-
-impl Default for ManagementConfig {
-    fn default() -> Self {
-        ManagementConfig {
-            confirm: ConfirmConfig::Existence(Probability::constant(0.95)),
-            min_existence: Probability::constant(0.02),
-            max_misses: 5,
-            max_coast: Positive::constant(15.0),
-        }
-    }
-}
-
-/// When a tentative track is confirmed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum ConfirmConfig {
-    /// When its probability of existence reaches this value.
-    Existence(#[schemars(extend("x-unit" = "1"))] Probability),
-    /// When enough of its last scans updated it.
-    Hits(HitsConfig),
-}
-
-/// Confirmation by counting.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HitsConfig {
-    /// Updates needed.
-    #[schemars(extend("x-unit" = "1"))]
-    pub hits: Count,
-    /// Among this many scans, at most 64.
-    #[schemars(extend("x-unit" = "1"))]
-    pub scans: Count,
-}
-
-impl ManagementConfig {
-    fn build(&self) -> multi::Management {
-        multi::Management {
-            confirm: match &self.confirm {
-                ConfirmConfig::Existence(threshold) => multi::Confirmation::Existence(threshold.get()),
-                ConfirmConfig::Hits(rule) => {
-                    multi::Confirmation::Hits { hits: rule.hits.get(), scans: rule.scans.get() }
-                }
-            },
-            min_existence: self.min_existence.get(),
-            max_misses: self.max_misses,
-            max_coast: Some(self.max_coast.get()),
-        }
     }
 }

@@ -16,6 +16,17 @@ pub(super) struct Cluster<B> {
 pub(super) struct Tree<B> {
     pub label: TrackId,
     pub leaves: Vec<Leaf<B>>,
+    /// Existence that a leaf keeps however often it is missed.
+    pub missed: f64,
+    /// Leaves that exist less are forgotten.
+    pub least: f64,
+}
+
+impl<B> Tree<B> {
+    /// A tree that begins with this leaf.
+    pub fn new(label: TrackId, leaf: Leaf<B>) -> Self {
+        Tree { label, leaves: vec![leaf], missed: 0.0, least: 0.0 }
+    }
 }
 
 /// One way in which a track's measurements may be chosen.
@@ -51,7 +62,7 @@ impl<B> Cluster<B> {
     /// A single tree with one leaf.
     pub fn single(label: TrackId, leaf: Leaf<B>) -> Self {
         let hypotheses = vec![Hypothesis { weight: 1.0, leaves: vec![Some(0)] }];
-        Cluster { trees: vec![Tree { label, leaves: vec![leaf] }], hypotheses }
+        Cluster { trees: vec![Tree::new(label, leaf)], hypotheses }
     }
 
     /// Probability of each leaf of a tree.

@@ -84,7 +84,7 @@ impl<'a, B: Clone> Growth<'a, B> {
             .map(|(tree, offspring)| branch(filter, scan, &measurements, tree, &offspring))
             .collect();
         let new = rows.iter().filter_map(|&row| fresh[measurements[row]].object.take());
-        trees.extend(new.map(|(label, leaf)| Tree { label, leaves: vec![leaf] }));
+        trees.extend(new.map(|(label, leaf)| Tree::new(label, leaf)));
         let mut grown = Cluster { trees, hypotheses };
         grown.normalise();
         grown
@@ -158,9 +158,11 @@ where
         });
         detected.unwrap_or_else(|| {
             let (r, seen) = (parent.existence, parent.detection);
-            let existence = r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
+            let missed = r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
+            let existence = if seen > 0.0 { missed.max(tree.missed) } else { missed };
             Leaf { existence, belief: parent.belief.clone(), measurement: None, detection: seen }
         })
     };
-    Tree { label: tree.label, leaves: order.into_iter().map(|(choice, _)| leaf(choice)).collect() }
+    let leaves = order.into_iter().map(|(choice, _)| leaf(choice)).collect();
+    Tree { leaves, ..tree }
 }

@@ -15,7 +15,7 @@ const ALIKE: f64 = 0.1;
 impl<B: Clone> Cluster<B> {
     /// Forgets leaves that hardly exist, and merges those that say the same: leaves with the same last measurement and within
     /// the squared distance `limit`.
-    pub fn reduce<const N: usize, F>(&mut self, filter: &F, limit: f64, least: f64)
+    pub fn reduce<const N: usize, F>(&mut self, filter: &F, limit: f64)
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
@@ -23,7 +23,7 @@ impl<B: Clone> Cluster<B> {
             self.exchange(filter, limit);
         }
         for number in 0..self.trees.len() {
-            let shares = self.shares(number);
+            let (shares, least) = (self.shares(number), self.trees[number].least);
             let mut places = merge_leaves(filter, &mut self.trees[number], &shares, limit);
             for (place, leaf) in places.iter_mut().zip(0..) {
                 let home = place.unwrap_or(leaf);

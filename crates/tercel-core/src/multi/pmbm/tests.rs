@@ -51,8 +51,8 @@ fn on_one_object_it_is_the_bernoulli_filter() {
     let config = PmbmConfig {
         gate: Gate::new(1.0 - 1e-12).unwrap(),
         survival,
-        undetected: 1e-4,
-        birth: 0.0,
+        undetected: Some(1e-4),
+        birth: Some(0.0),
         hypotheses: usize::MAX >> 20,
         prune: 1e-15,
         merge: 0.0,
@@ -70,7 +70,7 @@ fn on_one_object_it_is_the_bernoulli_filter() {
         // Where an object could still begin would be a second object; the scan says that nothing undetected is left.
         if step > 0 {
             plots.push([0, 1].map(|_| random.random_range(-30.0..30.0)).into());
-            tracker.undetected = Undetected::new(0.0, 0.0, survival).unwrap();
+            tracker.undetected = Undetected::new(Some(0.0), Some(0.0), survival).unwrap();
         }
         let scan = Scan { time, measurements: &plots, detection: &scene.0, clutter: &scene.1 };
         tracker.step(&filter, &scan).unwrap();

@@ -62,7 +62,7 @@ impl<B: Clone> Pmbm<B> {
             rest = others;
             let growth = Growth::new(cluster, own);
             let mut grown = growth.grow(filter, scan, &mut fresh, k_best, (config.hypotheses, config.prune));
-            grown.reduce(filter, config.merge, config.management.min_existence);
+            grown.reduce(filter, config.merge);
             grown.split(&mut next);
         }
         // What no tree has in its gate is clutter or the beginning of a tree of its own.
@@ -83,10 +83,12 @@ impl<B: Clone> Pmbm<B> {
     {
         let mut all = Vec::with_capacity(scan.measurements.len());
         let mut ln_intensities = Vec::with_capacity(scan.measurements.len());
+        let background = scan.clutter.background();
         for (number, (measurement, place)) in scan.measurements.iter().zip(places).enumerate() {
             let seen = scan.detection.probability(place.as_ref());
             let missed = if scan.detection.is_reports() { 0.0 } else { seen };
-            let objects = seen * self.undetected.intensity(place.as_ref()) * filter.area(measurement);
+            let objects =
+                seen * self.undetected.intensity(place.as_ref(), background) * filter.area(measurement);
             let ln_clutter = ln_clutter_at(filter, scan, measurement);
             let ln_intensity =
                 ln_clutter.max(objects.ln()) + (-(ln_clutter - objects.ln()).abs()).exp().ln_1p();

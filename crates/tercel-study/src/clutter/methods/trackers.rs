@@ -78,8 +78,8 @@ pub(crate) fn pmbm<B>(recording: &Recording) -> Result<Pmbm<B>, FilterError> {
     let area = recording.scene.area();
     Pmbm::new(PmbmConfig {
         gate: Gate::new(GATE)?,
-        undetected: PRESENT / area,
-        birth: BIRTHS / area,
+        undetected: Some(PRESENT / area),
+        birth: Some(BIRTHS / area),
         management: Management {
             confirm: Confirmation::Existence(0.5),
             min_existence: 1e-4,
