@@ -93,7 +93,7 @@ const STEPS: usize = 16;
 const LARGEST_LN: f64 = 60.0;
 
 impl Default for Marginals {
-    /// Is exact in clusters of up to 4096 assignments, or with up to 65,536 pairs of a row and a set of contested columns: some
+    /// Is exact in clusters of up to 4096 assignments, or with up to 65,536 pairs of a row and a set of contested columns: about a
     /// dozen of these.
     fn default() -> Self {
         Marginals::with_exact(ENUMERABLE)

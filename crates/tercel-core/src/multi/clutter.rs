@@ -9,7 +9,9 @@ use crate::error::FilterError;
 
 /// Clutter intensity: expected number of clutter measurements per scan and m² of the plane.
 ///
-/// For bearings alone it is per rad.
+/// It is per m² whatever the sensor: what is measured beyond the plane is spread evenly over a width that the sensor states, the
+/// heights of [`Position<3>`](crate::sensor::Position::with_clutter_heights) and the range rates of
+/// [`RangeBearingRate`](crate::sensor::RangeBearingRate::with_clutter_rates). For bearings alone it is per rad.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Clutter {
     /// The same everywhere.

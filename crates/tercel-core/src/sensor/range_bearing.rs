@@ -17,8 +17,8 @@ use crate::error::FilterError;
 /// ```
 ///
 /// ## Use it when
-/// a radar or sonar gives polar plots and the filter is extended, unscented or a particle filter. When the cross-range
-/// error is small against the range, [`ConvertedPolar`](super::ConvertedPolar) lets a Kalman filter do the same work.
+/// a radar or sonar gives polar plots and the filter is extended, unscented or a particle filter. Where `r σθ² / σr` is below
+/// about one, [`ConvertedPolar`](super::ConvertedPolar) lets a Kalman filter do the same work.
 ///
 /// ## Reference
 /// Bar-Shalom, Li and Kirubarajan (2001), section 10.4.

@@ -1,4 +1,5 @@
 use tercel_core::filter::Filter;
+use tercel_core::sensor::{Measurement, Position, Sensor};
 use tercel_neural::filter::{MnemonicKalman, MnemonicNetwork};
 
 use super::*;
@@ -67,10 +68,15 @@ fn agree(task: &MnemonicTask, set: &ParameterSet) {
     let flown = task.batch(draw(&[1, 2])).unwrap();
     let model = Model::new(task.card(), set.tensors()).unwrap();
     let network = Arc::new(MnemonicNetwork::from_model(&model).unwrap());
-    let filter = MnemonicKalman::new(network, task.sensor);
+    // The trainer reads each plot by itself; a filter of converted plots would take their noise at its prediction.
+    let read = |plot: &Measurement<2>| {
+        let reading = Sensor::<4, 2>::read(&task.sensor, plot, None).unwrap();
+        Measurement::from(reading.value).with_noise(reading.noise)
+    };
+    let filter = MnemonicKalman::new(network, Position::<2>::new(1.0).unwrap());
     let sightings: Vec<_> = [1, 2].map(|sample| task.plots.sighting(draw(&[1, 2]), sample).unwrap()).into();
     let mut beliefs: Vec<_> =
-        sightings.iter().map(|sighting| filter.birth(sighting.first().unwrap()).unwrap()).collect();
+        sightings.iter().map(|sighting| filter.birth(&read(sighting.first().unwrap())).unwrap()).collect();
     let weights = Weights::frozen(set);
     let mut state = task.first(&flown);
     for step in 1..=200 {
@@ -79,7 +85,7 @@ fn agree(task: &MnemonicTask, set: &ParameterSet) {
         for (member, (belief, sighting)) in beliefs.iter_mut().zip(&sightings).enumerate() {
             filter.predict(belief, 1.0);
             if let Some(plot) = &sighting.plots[step] {
-                filter.update(belief, plot).unwrap();
+                filter.update(belief, &read(plot)).unwrap();
             }
             let ran = filter.state(belief);
             let trained = gaussian(&found[member * GAUSSIAN..][..GAUSSIAN]);
