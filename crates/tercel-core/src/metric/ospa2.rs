@@ -75,17 +75,19 @@ impl Ospa2 {
     fn distance<const D: usize>(&self, f: &Trajectory<D>, g: &Trajectory<D>, window: &Range<usize>) -> f64 {
         let first = f.start.min(g.start).max(window.start);
         let last = f.steps().end.max(g.steps().end).min(window.end);
+        // A sum that would overflow is taken in units of the cut-off.
+        let overflows = (self.cutoff * last.saturating_sub(first) as f64).is_infinite();
+        let unit = if overflows { self.cutoff } else { 1.0 };
         let (mut sum, mut count) = (0.0, 0.0);
         for step in first..last {
             sum += match (f.at(step), g.at(step)) {
-                (Some(a), Some(b)) => (euclidean(a, b) / self.cutoff).min(1.0),
+                (Some(a), Some(b)) => euclidean(a, b).min(self.cutoff) / unit,
                 (None, None) => continue,
-                _ => 1.0,
+                _ => self.cutoff / unit,
             };
             count += 1.0;
         }
-        // In units of the cut-off no sum overflows.
-        sum / f64::max(count, 1.0) * self.cutoff
+        sum / f64::max(count, 1.0) * unit
     }
 }
 
