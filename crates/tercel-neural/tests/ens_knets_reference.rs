@@ -129,7 +129,7 @@ impl<'a> Reference<'a> {
     }
 
     fn update(&mut self, measurement: &Measurement<2>) {
-        let reading = Sensor::<4, 2>::read(&radar(), measurement);
+        let reading = Sensor::<4, 2>::read(&radar(), measurement, None).unwrap();
         let (mut states, mut innovations, mut spreads) = (Vec::new(), Vec::new(), Vec::new());
         for (net, belief) in self.nets.iter().zip(&mut self.beliefs) {
             let Gaussian { mean, covariance } = net.state(belief);
