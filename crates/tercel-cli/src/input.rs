@@ -6,8 +6,8 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, Bearings, Format, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import,
-    import_table_from, read_truths,
+    Angles, Bearings, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import, import_from,
+    read_truths,
 };
 
 use crate::console::Console;
@@ -61,6 +61,9 @@ pub struct ReadArguments {
     /// Leave out rows that repeat another row of their scan.
     #[arg(long)]
     pub drop_repeated: bool,
+    /// Keep base stations, aids to navigation and aircraft among the ships (ais, nmea).
+    #[arg(long)]
+    pub all_stations: bool,
 }
 
 /// A unit of angles.
@@ -182,25 +185,11 @@ impl ReadArguments {
         console: &Console,
     ) -> Result<Imported, Failure> {
         let _progress = Progress::spinner(console, "reading");
-        let options = ImportOptions { read: self.options(), ..options };
+        let options = ImportOptions { read: self.options(), all_stations: self.all_stations, ..options };
         match paths {
-            [path] if is_stdin(path.as_ref()) => self.import_stdin(source),
+            [path] if is_stdin(path.as_ref()) => Ok(import_from(source, std::io::stdin(), STDIN, &options)?),
             _ => Ok(import(source, paths, &options)?),
         }
-    }
-
-    fn import_stdin(&self, source: Source) -> Result<Imported, Failure> {
-        let format = match source {
-            Source::Csv => Format::Csv,
-            Source::Parquet => Format::Parquet,
-            Source::Ndjson => Format::Ndjson,
-            other => {
-                let message =
-                    format!("a recording of the kind `{}` cannot come from standard input", other.name());
-                return Err(Failure::usage(message));
-            }
-        };
-        Ok(import_table_from(std::io::stdin(), format, STDIN, &self.options())?)
     }
 }
 

@@ -20,9 +20,15 @@ pub(crate) fn frame(origin: Origin, file: &Arc<str>) -> Result<LocalFrame, DataE
 
 /// The median of latitudes and longitudes (rad), on the ellipsoid: where a frame lies without an origin.
 pub(crate) fn middle(positions: impl Iterator<Item = (f64, f64)>) -> Option<Origin> {
+    let mut positions = positions.peekable();
+    let (_, first) = *positions.peek()?;
+    middle_around(first, positions)
+}
+
+/// The same, for positions around a longitude.
+pub(crate) fn middle_around(first: f64, positions: impl Iterator<Item = (f64, f64)>) -> Option<Origin> {
     let (latitudes, longitudes): (Vec<f64>, Vec<f64>) = positions.unzip();
     // Longitudes near the date line are turned so that they do not fall apart.
-    let first = *longitudes.first()?;
     let near = |longitude: &f64| first + wrapped(longitude - first);
     let longitude = wrapped(median(longitudes.iter().map(near).collect())?);
     Some(Origin { latitude: median(latitudes)?, longitude, altitude: 0.0 })

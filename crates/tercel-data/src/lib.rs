@@ -51,14 +51,14 @@ pub use column::Angles;
 pub use error::{DataError, Place, Spot};
 pub use export::MapFormat;
 pub use format::Format;
-pub use import::{ImportOptions, Imported, LeftOut, Source, import};
+pub use import::{ImportOptions, Imported, LeftOut, Recording, Source, import, import_from};
 pub use metadata::SCHEMA_VERSION;
 pub use npy::{Array, read_npy, read_npy_from};
 pub use options::{Bearings, DateOrder, OnError, ReadOptions};
 pub use output::AtomicFile;
 pub use read::{
-    import_table_from, read_detections, read_detections_from, read_metrics, read_metrics_from, read_tracks,
-    read_tracks_from, read_truths, read_truths_from,
+    read_detections, read_detections_from, read_metrics, read_metrics_from, read_tracks, read_tracks_from,
+    read_truths, read_truths_from,
 };
 pub use tracks_writer::TracksWriter;
 pub use unit::Unit;

@@ -26,10 +26,7 @@ pub(crate) fn read_as(path: &Path, format: Format, options: &ReadOptions) -> Res
 }
 
 /// Reads detections from a stream, with what was decided and left out on the way; `name` stands for it in messages.
-///
-/// # Errors
-/// A [`DataError`] that says where the stream is wrong, and what was expected.
-pub fn import_table_from(
+pub(crate) fn read_stream_as(
     reader: impl Read,
     format: Format,
     name: &str,

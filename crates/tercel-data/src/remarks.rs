@@ -1,5 +1,7 @@
 //! What a reader has to say beside the table.
 
+use std::borrow::Cow;
+
 use crate::error::DataError;
 use crate::import::LeftOut;
 use crate::options::OnError;
@@ -31,21 +33,37 @@ impl Remarks {
     }
 
     /// Counts rows that are left out.
-    pub fn leave_out(&mut self, reason: String, rows: usize) {
+    pub fn leave_out(&mut self, reason: impl Into<Cow<'static, str>>, rows: usize) {
         /// A file with more kinds of faults than this is no table; the rest is counted together.
         const REASONS: usize = 32;
         if rows == 0 {
             return;
         }
+        let reason = reason.into();
         let full = self.left_out.len() >= REASONS;
         let reason = if full && !self.left_out.iter().any(|left| left.reason == reason) {
-            "other faults".to_owned()
+            "other faults".into()
         } else {
             reason
         };
         match self.left_out.iter_mut().find(|left| left.reason == reason) {
             Some(left) => left.rows += rows,
-            None => self.left_out.push(LeftOut { reason: reason.into(), rows }),
+            None => self.left_out.push(LeftOut { reason, rows }),
         }
+    }
+
+    /// Says something once.
+    pub fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Adds what another reader has to say.
+    pub fn join(&mut self, other: Remarks) {
+        for LeftOut { reason, rows } in other.left_out {
+            self.leave_out(reason, rows);
+        }
+        other.notes.into_iter().for_each(|note| self.note(note));
     }
 }

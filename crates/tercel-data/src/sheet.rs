@@ -201,11 +201,6 @@ fn whole(number: f64, column: &Column) -> Result<u64, Refusal> {
     Err(Refusal::new(number, column.expected()))
 }
 
-/// Seconds since 1970, as near as a double comes.
-pub(crate) fn unix_seconds(timestamp: jiff::Timestamp) -> f64 {
-    timestamp.as_second() as f64 + f64::from(timestamp.subsec_nanosecond()) * 1e-9
-}
-
 fn not_a_number(text: &str, column: &Column) -> Refusal {
     let refusal = Refusal::new(format!("`{text}`"), column.expected());
     if text.contains(',') && text.trim().replace(',', ".").parse::<f64>().is_ok() {

@@ -7,7 +7,8 @@ use std::path::PathBuf;
 
 use tercel_data::table::Observation;
 use tercel_data::{
-    Angles, Bearings, Format, ImportOptions, Imported, ReadOptions, Source, import, read_detections_from,
+    Angles, Bearings, DateOrder, Format, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import,
+    import_table_from, read_detections_from,
 };
 
 fn path(name: &str) -> PathBuf {
@@ -220,4 +221,188 @@ fn a_time_in_the_future_costs_no_other_row() {
     let imported = read_with("stream_one_future_time.ndjson", ReadOptions::default());
     assert_eq!(sizes(&imported).iter().sum::<usize>(), 81);
     assert_eq!(imported.detections.scans.len(), 41);
+}
+
+/// A table in CSV, with what was said about it.
+fn csv(text: &str, options: &ReadOptions) -> Imported {
+    import_table_from(text.as_bytes(), Format::Csv, "a.csv", options)
+        .unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+fn refused(text: &str, options: &ReadOptions) -> String {
+    let error = import_table_from(text.as_bytes(), Format::Csv, "a.csv", options).unwrap_err();
+    format!("{error}\n{}", error.help().unwrap_or_default())
+}
+
+#[test]
+fn units_stand_in_the_header_or_are_said() {
+    let near = |imported: &Imported, place: [f64; 2]| {
+        let position = positions(imported)[0];
+        assert!(
+            (position[0] - place[0]).hypot(position[1] - place[1]) < 1e-6,
+            "{position:?} is not {place:?}"
+        );
+    };
+    for header in [
+        "time,range_nm,bearing_deg",
+        "Time,Range (NM),Bearing [deg]",
+        "t,rangeNm,bearingDeg",
+        "time,rng_nmi,brg_deg",
+    ] {
+        let options = ReadOptions { bearings: Some(Bearings::Math), ..ReadOptions::default() };
+        near(&csv(&format!("{header}\n0,10,180\n"), &options), [-18_520.0, 0.0]);
+    }
+    for header in ["time,range,azimuth_deg", "time,r,az [deg]"] {
+        let imported = csv(&format!("{header}\n0,100,90\n"), &ReadOptions::default());
+        near(&imported, [100.0, 0.0]);
+        noted(&imported, "--bearings math");
+    }
+    let units = vec![("range".to_owned(), Unit::Kilometre), ("bearing".to_owned(), Unit::Degree)];
+    let options = ReadOptions { units, bearings: Some(Bearings::Compass), ..ReadOptions::default() };
+    near(&csv("time,range,bearing\n0,2,0\n", &options), [0.0, 2000.0]);
+    near(&csv("time,x_km,y (ft)\n0,1.5,1000\n", &ReadOptions::default()), [1500.0, 304.8]);
+    let options = ReadOptions { units: vec![("range".to_owned(), Unit::Knot)], ..ReadOptions::default() };
+    assert!(refused("time,range,bearing\n0,2,0\n", &options).contains("no such quantity"));
+}
+
+#[test]
+fn columns_go_by_the_names_that_are_said() {
+    let renames =
+        [("x", "east_m"), ("y", "b"), ("time", "when")].map(|(to, from)| (to.to_owned(), from.to_owned()));
+    let options = ReadOptions { renames: renames.to_vec(), ..ReadOptions::default() };
+    let imported = csv("when,a,b,east_m,snr\n0,7,2,1,9\n", &options);
+    assert_eq!(positions(&imported), [[1.0, 2.0]]);
+    noted(&imported, "not used: `a`, `snr`");
+    assert!(refused("t,x,y\n0,1,2\n", &options).contains("the file has no column `east_m`"));
+    let options = ReadOptions { ignore: vec!["east".to_owned()], ..ReadOptions::default() };
+    assert_eq!(positions(&csv("time,x,y,east\n0,1,2,3\n", &options)), [[1.0, 2.0]]);
+}
+
+#[test]
+fn identities_are_known_and_doubtful_ones_are_told() {
+    let identity = |header: &str| {
+        let imported = csv(&format!("time,x,y,{header}\n0,1,2,219000101\n"), &ReadOptions::default());
+        (imported.detections.scans[0].detections[0].identity.clone(), imported.notes)
+    };
+    for name in ["identity", "hex", "ICAO24", "Mode S"] {
+        let (known, notes) = identity(name);
+        assert_eq!((known.as_deref(), notes.len()), (Some("219000101"), 0), "{name}: {notes:?}");
+    }
+    for name in ["track_id", "target_id", "squawk", "callsign"] {
+        let (known, notes) = identity(name);
+        assert!(known.is_some() && notes[0].contains("--ignore"), "{name}: {notes:?}");
+    }
+    assert_eq!(identity("id").0, None);
+}
+
+#[test]
+fn dates_and_times_of_day_become_seconds() {
+    let seconds = |cells: &[&str], options: &ReadOptions| {
+        let rows: String = cells.iter().map(|cell| format!("{cell};1;2\n")).collect();
+        times(&csv(&format!("time;x;y\n{rows}"), options))
+    };
+    let default = ReadOptions::default();
+    let t = 1_709_632_800.0;
+    assert_eq!(seconds(&["2024-03-05 10:00:00", "2024-03-05 10:00:01,5"], &default), [t, t + 1.5]);
+    assert_eq!(seconds(&["05/03/2024 10:00", "13/03/2024 10:00"], &default), [t, t + 8.0 * 86_400.0]);
+    assert_eq!(seconds(&["03/05/2024 10:00", "03/13/2024 10:00"], &default), [t, t + 8.0 * 86_400.0]);
+    assert_eq!(seconds(&["23:59:59.5", "00:00:00.5", "00:00:01"], &default), [86_399.5, 86_400.5, 86_401.0]);
+    let oslo = ReadOptions { time_zone: Some("Europe/Oslo".to_owned()), ..ReadOptions::default() };
+    assert_eq!(seconds(&["2024-03-05T11:00"], &oslo), [t]);
+    let order = ReadOptions { date_order: Some(DateOrder::MonthFirst), ..ReadOptions::default() };
+    assert_eq!(seconds(&["03/05/2024 10:00"], &order), [t]);
+    assert!(refused("time,x,y\n03/05/2024 10:00,1,2\n", &default).contains("--date-order"));
+    let unit = ReadOptions { time_unit: Some(Unit::Millisecond), ..ReadOptions::default() };
+    assert_eq!(seconds(&["0", "1000"], &unit), [0.0, 1.0]);
+    assert_eq!(times(&csv("time_ms,x,y\n0,1,2\n1000,1,2\n", &default)), [0.0, 1.0]);
+}
+
+#[test]
+fn two_sensors_pass_midnight_one_after_the_other() {
+    let text = "time,sensor,x,y\n23:59:59,a,1,2\n00:00:01,a,1,2\n23:59:59.5,b,1,2\n00:00:01.5,b,1,2\n";
+    assert_eq!(times(&csv(text, &ReadOptions::default())), [86_399.0, 86_399.5, 86_401.0, 86_401.5]);
+}
+
+#[test]
+fn bad_rows_are_left_out_by_reason_on_request() {
+    let text =
+        "time,sensor,x,y\n0,a,1,2\n1,a,east,2\n2,a,3\n3,a,nan,2\nsoon,a,1,2\n4,a,west,2\n5,a,1,2\n6,a,1";
+    let imported = csv(text, &ReadOptions { on_error: OnError::Skip, ..ReadOptions::default() });
+    assert_eq!(times(&imported), [0.0, 5.0]);
+    let mut counts: Vec<(String, usize)> =
+        imported.left_out.iter().map(|left| (left.reason.to_string(), left.rows)).collect();
+    counts.sort();
+    assert_eq!(counts.iter().map(|(_, rows)| rows).sum::<usize>(), 6, "{counts:?}");
+    assert!(counts.contains(&("`x` is not a finite number".to_owned(), 2)), "{counts:?}");
+    assert!(refused(text, &ReadOptions::default()).starts_with("a.csv:3: "));
+    assert!(
+        refused("time,sensor,x,y\n0,a,1,2\n1,a,2", &ReadOptions::default()).contains("the last line is cut")
+    );
+}
+
+#[test]
+fn repeated_rows_are_told_and_dropped_on_request() {
+    let text = "time,x,y\n0,1,2\n0,1,2\n0,3,4\n1,1,2\n1,1,2\n";
+    let imported = csv(text, &ReadOptions::default());
+    noted(&imported, "2 of 5 rows repeat");
+    assert_eq!(sizes(&imported), [3, 2]);
+    let imported = csv(text, &ReadOptions { drop_repeated: true, ..ReadOptions::default() });
+    assert_eq!(sizes(&imported), [2, 1]);
+    assert_eq!(imported.left_out[0].rows, 2);
+}
+
+#[test]
+fn numbers_of_scans_may_begin_anew_and_rows_of_a_scan_stand_anywhere() {
+    let rows: String = (0..40).map(|i| format!("{i}.0,{0},1,2\n{i}.5,{0},1,2\n", i % 16)).collect();
+    assert_eq!(sizes(&csv(&format!("time,scan,x,y\n{rows}"), &ReadOptions::default())), [2; 40]);
+    let mut rows: Vec<&str> = rows.lines().collect();
+    rows.sort_by_key(|row| row.chars().rev().collect::<String>());
+    rows.rotate_left(13);
+    let shuffled = rows.join("\n");
+    assert_eq!(sizes(&csv(&format!("time,scan,x,y\n{shuffled}\n"), &ReadOptions::default())), [2; 40]);
+}
+
+#[test]
+fn json_is_read_in_every_arrangement() {
+    let read = |text: &str| {
+        import_table_from(text.as_bytes(), Format::Ndjson, "a.json", &ReadOptions::default())
+            .unwrap_or_else(|error| panic!("{error}: {:?}\n{text}", error.help()))
+    };
+    let plain = read("{\"time\":0,\"x\":1,\"y\":2}\n{\"time\":1,\"x\":3,\"y\":4}\n").detections;
+    for text in [
+        "[{\"time\":0,\"x\":1,\"y\":2},{\"time\":1,\"x\":3,\"y\":4}]",
+        "[\n  {\n    \"time\": 0,\n    \"x\": 1,\n    \"y\": 2\n  },\n  {\"time\": 1, \"x\": 3, \"y\": 4}\n]\n",
+        "{\n \"time\": 0, \"x\": 1, \"y\": 2\n}\n{\n \"time\": 1, \"x\": 3, \"y\": 4\n}\n",
+        "{\"time\":0,\"targets\":[{\"x\":1,\"y\":2}]}\n{\"time\":1,\"data\":[{\"pos_x\":3,\"pos_y\":4}]}\n",
+        "{\"time\":0,\"position\":{\"x\":1,\"y\":2}}\n{\"time\":1,\"position\":[3,4]}\n",
+    ] {
+        assert_eq!(read(text).detections, plain, "{text}");
+    }
+    let document = "{\"data\":[{\"time\":0,\"x\":1,\"y\":2},{\"time\":1,\"x\":3,\"y\":4}]}";
+    assert_eq!(read(document).detections, plain);
+    let nowhere = "{\"time\":0,\"sensor\":\"a\",\"foo\":1,\"bar\":2}\n";
+    let error =
+        import_table_from(nowhere.as_bytes(), Format::Ndjson, "a.json", &ReadOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("the keys are `bar`, `foo`, `sensor`, `time`"), "{error}");
+}
+
+#[test]
+fn longitudes_may_run_to_360_and_altitudes_give_a_height() {
+    let imported =
+        csv("time,lat,lon,alt_ft\n0,-17.5,179.99,1000\n1,-17.5,180.01,1000\n", &ReadOptions::default());
+    let positions = positions(&imported);
+    assert!((positions[1][0] - positions[0][0] - 2123.0).abs() < 5.0, "{positions:?}");
+    let Observation::Position { z, .. } = imported.detections.scans[0].detections[0].observation else {
+        panic!()
+    };
+    assert!((z.unwrap() - 304.8).abs() < 1.0, "{z:?}");
+    assert!(refused("time,lat,lon\n0,179.9,-17.5\n", &ReadOptions::default()).contains("swapped"));
+}
+
+#[test]
+fn lines_before_the_header_are_passed_over_and_told() {
+    let imported =
+        csv("Radar export\nStation 5, north\n\ntime,x,y\n0,1,2\n1,1,2\n2,1,2\n", &ReadOptions::default());
+    assert_eq!(times(&imported), [0.0, 1.0, 2.0]);
+    noted(&imported, "3 lines before the header");
 }

@@ -263,7 +263,7 @@ fn importers() {
         &[
             ("not ADS-B", "t,x\n0,1\n"),
             ("latitude out of range", "time,icao24,lat,lon\n0,a,514000,1\n"),
-            ("milliseconds", "time,icao24,lat,lon\n1626098400000,a,51,1\n"),
+            ("day or month", "time,icao24,lat,lon\n05/03/2024 10:00:00,a,51,1\n"),
             ("no time", "time,icao24,lat,lon\nyesterday,a,51,1\n"),
         ],
         read(Adsb, "adsb.csv"),

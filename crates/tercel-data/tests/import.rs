@@ -6,9 +6,8 @@
 use std::path::Path;
 
 use tercel_core::geo::{Geodetic, LocalFrame};
-use tercel_data::import::{adsb, ais};
 use tercel_data::table::{Detections, Observation, Origin, Truth};
-use tercel_data::{ImportOptions, Imported, LeftOut, Source, import, write_detections};
+use tercel_data::{ImportOptions, Imported, LeftOut, Source, import, import_from, write_detections};
 
 const ORIGIN: Origin = Origin { latitude: 0.9, longitude: 0.05, altitude: 100.0 };
 
@@ -17,11 +16,11 @@ fn options() -> ImportOptions {
 }
 
 fn aircraft(text: &str, options: &ImportOptions) -> Imported {
-    adsb::read_from(text.as_bytes(), "adsb.csv", options).unwrap()
+    import_from(Source::Adsb, text.as_bytes(), "adsb.csv", options).unwrap()
 }
 
 fn ships(text: &str) -> Imported {
-    ais::read_from(text.as_bytes(), "ais.csv", &options()).unwrap()
+    import_from(Source::Ais, text.as_bytes(), "ais.csv", &options()).unwrap()
 }
 
 fn truths(imported: &Imported) -> &[Truth] {
@@ -173,7 +172,7 @@ fn what_ships_do_not_know_is_nothing() {
         imported.left_out,
         [
             LeftOut { reason: "without a time or position".into(), rows: 1 },
-            LeftOut { reason: "a repeated report".into(), rows: 1 }
+            LeftOut { reason: "the same report from another receiver".into(), rows: 1 }
         ]
     );
 }
@@ -185,7 +184,7 @@ fn reports_of_one_time_are_one_scan_and_truth_is_optional() {
     let sizes: Vec<usize> = imported.detections.scans.iter().map(|scan| scan.detections.len()).collect();
     assert_eq!(sizes, [1, 2]);
     let options = ImportOptions { truths: false, ..options() };
-    assert_eq!(ais::read_from(text.as_bytes(), "ais.csv", &options).unwrap().truths, None);
+    assert_eq!(import_from(Source::Ais, text.as_bytes(), "ais.csv", &options).unwrap().truths, None);
 }
 
 #[test]
@@ -225,7 +224,7 @@ fn several_files_share_a_frame_and_a_numbering() {
     });
     let imported = import(Source::Adsb, &paths, &ImportOptions::default()).unwrap();
     let scans = &imported.detections.scans;
-    assert_eq!(scans.iter().map(|scan| scan.time).collect::<Vec<_>>(), [-1.0, 0.0, 2.0, 2.0]);
+    assert_eq!(scans.iter().map(|scan| scan.time).collect::<Vec<_>>(), [-1.0, 0.0, 2.0]);
     let ids: Vec<u64> =
         scans.iter().flat_map(|scan| &scan.detections).map(|detection| detection.id).collect();
     assert_eq!(ids, [0, 1, 2, 3]);

@@ -9,11 +9,12 @@ use std::io::Write;
 
 use proptest::collection::vec;
 use proptest::prelude::*;
-use tercel_data::import::{adsb, ais, autoferry};
+use tercel_data::import::autoferry;
 use tercel_data::ndjson::Scans;
 use tercel_data::{
-    Format, ImportOptions, ReadOptions, read_detections_from, read_metrics_from, read_tracks_from,
-    read_truths_from, write_detections_to, write_metrics_to, write_tracks_to, write_truths_to,
+    Format, ImportOptions, ReadOptions, Source, import_from, read_detections_from, read_metrics_from,
+    read_tracks_from, read_truths_from, write_detections_to, write_metrics_to, write_tracks_to,
+    write_truths_to,
 };
 
 const FORMATS: [Format; 3] = [Format::Csv, Format::Parquet, Format::Ndjson];
@@ -33,8 +34,9 @@ fn read_as_everything(bytes: &[u8]) {
     }
     let _ = autoferry::read_detections_from(bytes, "noise");
     let _ = autoferry::read_truths_from(bytes, "noise");
-    let _ = adsb::read_from(bytes, "noise", &ImportOptions::default());
-    let _ = ais::read_from(bytes, "noise", &ImportOptions::default());
+    for source in Source::ALL {
+        let _ = import_from(source, bytes, "noise", &ImportOptions::default());
+    }
 }
 
 /// Changes of a file: bytes that are replaced, and where it ends.
@@ -59,6 +61,14 @@ time,icao24,mmsi,lat,lon,velocity,heading,sog,cog,geoaltitude,lastposupdate
 1626098400,3c4591,235070762,51.4,-0.4,254.6,99.6,5.9,157.8,10843,1626098398.9
 2016-01-12 13:02:11.2,407a19,235013375,53.4,-4.0,,,102.3,360,,
 ";
+
+/// One recording of each form that is no table.
+const FORMS: [&str; 4] = [
+    "\\s:rx1,c:1709632800*07\\!AIVDM,1,1,,A,13@ne9OP1p0kA@0P6LH1hP01P000,0*68\n!AIVDM,2,1,3,B,1,0*25\n",
+    "MSG,3,1,1,4CA2D6,1,2024/03/05,10:00:00.000,2024/03/05,10:00:00.000,,36089,,,47.45,8.55,,,0,0,0,0\n",
+    "{\"now\": 1709632802.9, \"aircraft\": [{\"hex\": \"4ca2d6\", \"lat\": 47.45, \"lon\": 8.55, \"seen_pos\": 1.5}]}\n",
+    "{\"time\": 1, \"states\": [[\"4ca2d6\", \"RYR\", \"Ireland\", 1, 1, 8.55, 47.45, 11000.0, false, 230.0, 70.0]]}",
+];
 
 const FERRY: &str = r#"[{"sensorID":2,"ownshipPosition":[1.0,2.0],"time":1.6E9,"measurement":[[1,2],[3,4]]},
 {"sensorID":3,"ownshipPosition":[1.0,2.0],"time":1.7E9,"measurement":0.5}]"#;
@@ -106,6 +116,9 @@ proptest! {
     fn damaged_recordings_are_refused_or_read((changes, end) in damage()) {
         read_as_everything(&damaged(REPORTS.as_bytes(), &changes, end));
         read_as_everything(&damaged(FERRY.as_bytes(), &changes, end));
+        for form in FORMS {
+            read_as_everything(&damaged(form.as_bytes(), &changes, end));
+        }
         let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
         gzip.write_all(REPORTS.as_bytes()).unwrap();
         read_as_everything(&damaged(&gzip.finish().unwrap(), &changes, end));

@@ -1,7 +1,7 @@
 //! The file formats. Each reads and writes a [`Sheet`]; none knows what the columns mean.
 
 pub(crate) mod csv;
-mod guard;
+pub(crate) mod guard;
 pub(crate) mod json;
 pub(crate) mod parquet;
 mod rounded;

@@ -3,70 +3,53 @@
 pub mod adsb;
 pub mod ais;
 pub mod autoferry;
-mod cooperative;
-mod fields;
+mod clock;
+mod content;
+mod input;
+mod merge;
+pub mod nmea;
 mod recognise;
+mod recording;
+mod report;
+pub mod sbs;
+mod scans;
+mod source;
+mod station;
+mod survey;
+mod table;
+mod tables;
 
 use std::borrow::Cow;
+use std::io::Read;
 use std::path::Path;
 
-use crate::error::{DataError, Refusal};
-use crate::format::Format;
+use self::content::Content;
+use self::input::Input;
+pub use self::recording::Recording;
+use self::report::{Reporter, Reports};
+use self::source::Kind;
+pub use self::source::Source;
+use crate::error::DataError;
 use crate::options::ReadOptions;
-use crate::read::read_as;
-use crate::table::{Description, Detections, Origin, Truths};
-
-/// Where a recording comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Source {
-    /// The table of detections as CSV.
-    Csv,
-    /// The table of detections as Parquet.
-    Parquet,
-    /// The table of detections as NDJSON.
-    Ndjson,
-    /// The Autoferry benchmark: radar, lidar and cameras of a small ferry, with GNSS truth.
-    Autoferry,
-    /// Positions that aircraft broadcast, as CSV in the manner of the OpenSky Network.
-    Adsb,
-    /// Positions that ships broadcast, as CSV.
-    Ais,
-}
-
-impl Source {
-    /// Every source, in the order in which help texts list them.
-    pub const ALL: [Source; 6] =
-        [Source::Csv, Source::Parquet, Source::Ndjson, Source::Autoferry, Source::Adsb, Source::Ais];
-
-    /// The name used on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Source::Csv => "csv",
-            Source::Parquet => "parquet",
-            Source::Ndjson => "ndjson",
-            Source::Autoferry => "autoferry",
-            Source::Adsb => "adsb",
-            Source::Ais => "ais",
-        }
-    }
-}
+use crate::table::{Detections, Origin, Truths};
 
 /// How a recording is brought in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportOptions {
-    /// How a canonical table is read.
+    /// How tables are read: times, dates, and what becomes of rows that cannot be used, of all sources.
     pub read: ReadOptions,
     /// Origin of the local frame for sources with geographic coordinates; without one, their median position.
     pub origin: Option<Origin>,
     /// Whether the truth is brought in, too: the file beside the detections, or what objects say of themselves.
     pub truths: bool,
-    /// Whether reports that repeat a position are kept.
+    /// Whether reports that repeat a position are kept, and those that another receiver had heard as well.
     pub keep_repeated: bool,
     /// Whether a report keeps its own time where the time of its position is known.
     pub reported_time: bool,
     /// Whether an aircraft with another callsign is another object: `3c4591/BOX413`.
     pub split_callsigns: bool,
+    /// Whether base stations, aids to navigation and aircraft in AIS are kept.
+    pub all_stations: bool,
 }
 
 impl Default for ImportOptions {
@@ -78,6 +61,7 @@ impl Default for ImportOptions {
             keep_repeated: false,
             reported_time: false,
             split_callsigns: false,
+            all_stations: false,
         }
     }
 }
@@ -104,16 +88,6 @@ pub struct LeftOut {
     pub rows: usize,
 }
 
-impl LeftOut {
-    fn list<const N: usize>(reasons: [(&'static str, usize); N]) -> Vec<LeftOut> {
-        reasons
-            .into_iter()
-            .filter(|(_, rows)| *rows > 0)
-            .map(|(reason, rows)| LeftOut { reason: reason.into(), rows })
-            .collect()
-    }
-}
-
 /// Brings in a recording. Of several files the scans follow each other in the order of time.
 ///
 /// ```no_run
@@ -125,94 +99,58 @@ impl LeftOut {
 /// # Ok::<(), tercel_data::DataError>(())
 /// ```
 ///
+/// [`Recording`] gives the same scans one by one, without holding a long recording in memory.
+///
 /// # Errors
-/// A [`DataError`] that says where a file is wrong, and what was expected; also when the files do not fit
-/// together, because they lie in different local frames or number their detections alike.
+/// A [`DataError`] that says where a file is wrong, and what was expected; also when tables do not fit together, because they
+/// lie in different local frames.
 pub fn import<P: AsRef<Path>>(
     source: Source,
     paths: &[P],
     options: &ImportOptions,
 ) -> Result<Imported, DataError> {
-    let mut whole: Option<Imported> = None;
-    for path in paths {
-        let path = path.as_ref();
-        // All files share the frame of the first.
-        let origin = options.origin.or(whole.as_ref().and_then(|whole| whole.detections.origin));
-        let part = import_one(source, path, &ImportOptions { origin, ..options.clone() })?;
-        whole = Some(match whole {
-            Some(whole) => join(whole, part, path)?,
-            None => part,
-        });
-    }
-    Ok(whole.unwrap_or_default())
-}
-
-fn import_one(source: Source, path: &Path, options: &ImportOptions) -> Result<Imported, DataError> {
-    let read = ReadOptions { origin: options.origin.or(options.read.origin), ..options.read.clone() };
-    let table = |format| read_as(path, format, &read);
-    match source {
-        Source::Csv => table(Format::Csv),
-        Source::Parquet => table(Format::Parquet),
-        Source::Ndjson => table(Format::Ndjson),
-        Source::Autoferry => autoferry::read(path, options),
-        Source::Adsb => adsb::read(path, options),
-        Source::Ais => ais::read(path, options),
+    match source.kind() {
+        Kind::Reports(_) => Recording::open(source, paths, options)?.collect(options),
+        _ => tables::import(source, paths, options),
     }
 }
 
-/// Appends a recording to another; detections are numbered anew, since two files may use the same numbers.
-fn join(mut whole: Imported, mut part: Imported, path: &Path) -> Result<Imported, DataError> {
-    if whole.detections.origin != part.detections.origin {
-        return Err(DataError::Metadata {
-            file: crate::format::file_name(path),
-            problem: "the origin is another one than in the file before".to_owned(),
-            help: "bring in the files one by one".to_owned(),
-        });
+/// Brings in a recording from a stream; `name` stands for it in messages.
+///
+/// ```
+/// use tercel_data::{ImportOptions, Source, import_from};
+///
+/// let csv = "mmsi,time,lat,lon\n219000101,2024-03-05T10:00:00Z,56.1,11.2\n";
+/// let imported = import_from(Source::Ais, csv.as_bytes(), "standard input", &ImportOptions::default())?;
+/// assert_eq!(imported.detections.scans[0].detections[0].identity.as_deref(), Some("219000101"));
+/// # Ok::<(), tercel_data::DataError>(())
+/// ```
+///
+/// # Errors
+/// A [`DataError`] that says where the stream is wrong, and what was expected.
+pub fn import_from(
+    source: Source,
+    reader: impl Read,
+    name: &str,
+    options: &ImportOptions,
+) -> Result<Imported, DataError> {
+    match source.kind() {
+        Kind::Reports(_) => Recording::from_reader(source, reader, name, options)?.collect(options),
+        _ => tables::import_from(source, reader, name, options),
     }
-    // A file without scans says nothing of the others.
-    let parts = [&mut whole.detections, &mut part.detections];
-    let described = parts.into_iter().filter(|part| !part.scans.is_empty());
-    let described = described.map(|part| std::mem::take(&mut part.description));
-    whole.detections.description = described.reduce(Description::joined).unwrap_or_default();
-    whole.detections.scans.extend(part.detections.scans);
-    whole.detections.scans.sort_by(|a, b| a.time.total_cmp(&b.time));
-    let detections = whole.detections.scans.iter_mut().flat_map(|scan| &mut scan.detections);
-    detections.zip(0..).for_each(|(detection, id)| detection.id = id);
-    whole.truths = match (whole.truths, part.truths) {
-        (Some(mut truths), Some(more)) => {
-            truths.rows.extend(more.rows);
-            Some(truths)
+}
+
+/// Begins to read the reports of a file: in the form that its content has, if the source has several.
+fn open_reports(source: Source, input: &Input, options: &ImportOptions) -> Result<Reports, DataError> {
+    let content = input.content()?;
+    let reporter: Box<dyn Reporter> = match (source, source.family(), content) {
+        (_, _, Content::Empty) => return Err(DataError::Empty { file: input.name.clone() }),
+        (Source::Nmea, ..) | (_, Source::Ais, Content::Nmea) => {
+            Box::new(nmea::Sentences::new(input, options)?)
         }
-        (truths, more) => truths.or(more),
+        (Source::Sbs, ..) | (_, Source::Adsb, Content::Sbs) => Box::new(sbs::Messages::new(input, options)?),
+        (_, Source::Ais, _) => Box::new(ais::Ships::new(input, options)?),
+        _ => Box::new(adsb::Aircraft::new(input, options)?),
     };
-    for LeftOut { reason, rows } in part.left_out {
-        match whole.left_out.iter_mut().find(|known| known.reason == reason) {
-            Some(known) => known.rows += rows,
-            None => whole.left_out.push(LeftOut { reason, rows }),
-        }
-    }
-    whole.notes.extend(part.notes);
-    Ok(whole)
-}
-
-/// A latitude in radians; nothing when the file says that it is not available.
-fn latitude(line: &fields::Report<'_>, field: &fields::Field) -> Result<Option<f64>, DataError> {
-    degrees(line, field, 90.0)
-}
-
-/// A longitude in radians; nothing when the file says that it is not available.
-fn longitude(line: &fields::Report<'_>, field: &fields::Field) -> Result<Option<f64>, DataError> {
-    degrees(line, field, 180.0)
-}
-
-fn degrees(line: &fields::Report<'_>, field: &fields::Field, limit: f64) -> Result<Option<f64>, DataError> {
-    match line.number(field)? {
-        // 91 and 181 stand for an unknown position.
-        Some(value) if value == limit + 1.0 => Ok(None),
-        Some(value) if value.abs() > limit => {
-            let expected = format!("degrees in [-{limit}, {limit}]");
-            Err(line.refuse(field, Refusal::new(value, expected)))
-        }
-        value => Ok(value.map(f64::to_radians)),
-    }
+    Ok(Reports::new(reporter, options.read.on_error))
 }

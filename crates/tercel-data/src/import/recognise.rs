@@ -1,57 +1,89 @@
 //! Telling the source of a recording from the file.
 
-use std::io::BufRead;
 use std::path::Path;
 
-use super::{Source, adsb, ais, fields};
-use crate::error::DataError;
-use crate::format::{Format, file_name, open};
+use super::content::Content;
+use super::input::Input;
+use super::source::NAMES;
+use super::table::{Names, PLAIN, Shape, Table};
+use super::{Source, adsb, ais, autoferry};
+use crate::error::{DataError, Place};
+use crate::format::{Format, file_name};
+use crate::options::ReadOptions;
+
+/// Columns that only our own tables have.
+const CANONICAL: Names = Names(&[(PLAIN, &["x", "bearing", "detections"])]);
+/// Of a plot that a sensor made, whatever else is known of it.
+const SENSOR: Names = Names(&[(PLAIN, &["sensor"])]);
 
 impl Source {
-    /// The source that a file seems to come from, by its name and, for CSV, by its columns.
+    /// The source that a file seems to come from: by its content, and where that says little, by its name.
     ///
-    /// Parquet and NDJSON files are canonical tables. A CSV file with a column for the address of an aircraft
-    /// (`icao24`) or the number of a ship (`MMSI`) is ADS-B or AIS, every other one a canonical table. JSON files
-    /// are Autoferry recordings when they begin like one.
+    /// A table (CSV or other text, Parquet, lines of JSON) with a column for the number of a ship (`MMSI`) or the address of
+    /// an aircraft (`icao24`, `hex`) is AIS or ADS-B, and a table of ours otherwise. Sentences of AIS receivers, messages of
+    /// BaseStation feeds, `aircraft.json` and the answers of the OpenSky Network are told by their first lines, and so are
+    /// Autoferry recordings.
     ///
     /// # Errors
-    /// [`DataError::UnknownFormat`] when nothing fits, and when the file cannot be read.
+    /// [`DataError::UnknownFormat`] when nothing fits, [`DataError::Unsettled`] for the boxes of the MOT Challenge, which are
+    /// not read, and when the file cannot be read.
     pub fn recognise(path: impl AsRef<Path>) -> Result<Source, DataError> {
         let path = path.as_ref();
-        let unknown = DataError::UnknownFormat {
-            file: file_name(path),
-            known: "csv, parquet, ndjson, autoferry, adsb and ais",
+        // The name may be the common beginning of those of a recording.
+        let input = Input::file(&autoferry::detections_file(path));
+        let unknown = DataError::UnknownFormat { file: file_name(path), known: NAMES };
+        let named = match Format::of_input(path) {
+            Some(Format::Csv) => Some(Source::Csv),
+            Some(Format::Parquet) => Some(Source::Parquet),
+            Some(Format::Ndjson) => Some(Source::Ndjson),
+            None => None,
         };
-        match Format::of_input(path).ok_or(()) {
-            Ok(Format::Parquet) => Ok(Source::Parquet),
-            Ok(Format::Ndjson) => Ok(Source::Ndjson),
-            Ok(Format::Csv) => {
-                let (file, mut reader) = open(path)?;
-                let lines = match fields::Reports::new(reader.as_mut(), &file) {
-                    Ok(lines) => lines,
-                    // The reader of the table says better what is wrong.
-                    Err(error) if !error.is_io() => return Ok(Source::Csv),
-                    Err(error) => return Err(error),
-                };
-                Ok(if lines.field(adsb::AIRCRAFT).present() {
-                    Source::Adsb
-                } else if lines.field(ais::SHIP).present() {
-                    Source::Ais
-                } else {
-                    Source::Csv
-                })
+        match input.content()? {
+            Content::Autoferry => Ok(Source::Autoferry),
+            Content::Nmea => Ok(Source::Nmea),
+            Content::Sbs => Ok(Source::Sbs),
+            Content::Json(Shape::Aircraft) => Ok(Source::AircraftJson),
+            Content::Json(Shape::States) => Ok(Source::OpenSky),
+            Content::Json(Shape::Objects) => {
+                // Other JSON than lines has the ending `.json`, too.
+                let ours = || has_time(&input) || Format::of(path).is_ok();
+                by_columns(&input).or_else(|| ours().then_some(Source::Ndjson)).ok_or(unknown)
             }
-            Err(_) if begins_like_autoferry(path)? => Ok(Source::Autoferry),
-            Err(_) => Err(unknown),
+            Content::Parquet => Ok(by_columns(&input).unwrap_or(Source::Parquet)),
+            Content::Described => Ok(Source::Csv),
+            Content::Text => by_columns(&input).or(named).ok_or(unknown),
+            Content::Empty => named.ok_or(unknown),
+            Content::Mot => Err(DataError::unsettled(
+                Place::whole(&input.name),
+                "these are pixel boxes of the MOT Challenge, which are not read",
+                "write the points of interest, such as the middles of the lower edges, as a table with `time`, `sensor`, \
+                 `x`, `y` in m",
+            )),
         }
     }
 }
 
-/// True when one of the first fields is that of a sensor of the Autoferry recordings. `path` may also be the
-/// common beginning of the names of a recording.
-fn begins_like_autoferry(path: &Path) -> Result<bool, DataError> {
-    let (file, mut reader) = open(&super::autoferry::detections_file(path))?;
-    let start = reader.fill_buf().map_err(|error| crate::format::read_error(&file, error))?;
-    let start = &start[..start.len().min(4096)];
-    Ok(start.trim_ascii_start().starts_with(b"[") && start.windows(10).any(|part| part == b"\"sensorID\""))
+/// The source of a table, if its columns tell that it is one of ships or aircraft. Of files that cannot be read the reader
+/// says better what is wrong.
+fn by_columns(input: &Input) -> Option<Source> {
+    let wanted: Vec<&Names> =
+        ais::NAMES.into_iter().chain(adsb::NAMES).chain([&CANONICAL, &SENSOR]).collect();
+    let table = Table::open(input, &wanted, &ReadOptions::default()).ok()?;
+    let has = |names| table.field(names).present();
+    let place = has(&adsb::LATITUDE) || has(&adsb::POSITION);
+    if has(&CANONICAL) {
+        None
+    } else if has(&adsb::AIRCRAFT) || (place && has(&adsb::CALLSIGN) && !has(&ais::SHIP) && !has(&SENSOR)) {
+        Some(Source::Adsb)
+    } else if has(&ais::SHIP) {
+        Some(Source::Ais)
+    } else {
+        None
+    }
+}
+
+/// True when rows have a time, or the first line describes a table of ours.
+fn has_time(input: &Input) -> bool {
+    const TIME: Names = Names(&[(PLAIN, &["time", "tercel"])]);
+    Table::open(input, &[], &ReadOptions::default()).is_ok_and(|table| table.field(&TIME).present())
 }

@@ -59,7 +59,7 @@ fn alternates(start: &[u8], first: usize) -> bool {
 }
 
 /// Text from a stream that is already decompressed. What is plainly no text is refused by the name of what it is.
-pub(crate) fn text<'a>(reader: &'a mut dyn BufRead, file: &Arc<str>) -> Result<Text<'a>, DataError> {
+pub(crate) fn text<'a>(mut reader: impl BufRead + 'a, file: &Arc<str>) -> Result<Text<'a>, DataError> {
     let start = reader.fill_buf().map_err(|error| read_error(file, error))?;
     let (encoding, mark) = Encoding::of(start);
     if encoding == Encoding::Utf8 {
@@ -88,8 +88,8 @@ fn refuse_binary(kind: Kind, file: &Arc<str>) -> Result<(), DataError> {
 }
 
 /// Turns bytes into UTF-8.
-struct Decoder<'a> {
-    reader: &'a mut dyn BufRead,
+struct Decoder<R> {
+    reader: R,
     encoding: Encoding,
     /// Bytes of a character that is not complete.
     bytes: Vec<u8>,
@@ -98,7 +98,7 @@ struct Decoder<'a> {
     foreign: Rc<Cell<u64>>,
 }
 
-impl Decoder<'_> {
+impl<R: BufRead> Decoder<R> {
     /// Decodes the next part of the stream; the text is empty at its end.
     fn refill(&mut self) -> io::Result<()> {
         self.text.clear();
@@ -172,7 +172,7 @@ fn windows_1252(byte: u8) -> char {
     }
 }
 
-impl Read for Decoder<'_> {
+impl<R: BufRead> Read for Decoder<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         let some = self.fill_buf()?.read(into)?;
         self.consume(some);
@@ -180,7 +180,7 @@ impl Read for Decoder<'_> {
     }
 }
 
-impl BufRead for Decoder<'_> {
+impl<R: BufRead> BufRead for Decoder<R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.taken >= self.text.len() {
             self.refill()?;

@@ -21,6 +21,9 @@ impl Moment {
     /// Reads a number, a date or a time of day.
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
+        if let Some(usual) = usual(text.as_bytes()) {
+            return Some(usual);
+        }
         if let Some(compact) = compact(text) {
             return Some(compact);
         }
@@ -51,6 +54,49 @@ impl Moment {
         let days = days_since_1970(date);
         Some(days as f64 * DAY + seconds)
     }
+}
+
+/// The forms of most rows of long files, quickly: `2024-03-05T10:00:00.25Z` and `05/03/2024 10:00:00`, `Z` and fraction or not.
+fn usual(text: &[u8]) -> Option<Moment> {
+    let number = |from: usize, to: usize| {
+        text.get(from..to)?.iter().try_fold(0_u32, |number, byte| {
+            byte.is_ascii_digit().then(|| number * 10 + u32::from(byte - b'0'))
+        })
+    };
+    let is = |at: usize, byte: u8| text.get(at) == Some(&byte);
+    if text.len() < 19 || !is(13, b':') || !is(16, b':') || !matches!(text[10], b'T' | b' ') {
+        return None;
+    }
+    let (hour, minute, second) = (number(11, 13)?, number(14, 16)?, number(17, 19)?);
+    let (fraction, ended) = match &text[19..] {
+        [] => (0.0, false),
+        [b'Z'] => (0.0, true),
+        [b'.', digits @ ..] => {
+            let (digits, ended) = digits.strip_suffix(b"Z").map_or((digits, false), |digits| (digits, true));
+            let end = 20 + digits.len();
+            if !(1..=9).contains(&digits.len()) {
+                return None;
+            }
+            (f64::from(number(20, end)?) / 10_f64.powi(digits.len() as i32), ended)
+        }
+        _ => return None,
+    };
+    if hour > 23 || minute > 59 || second > 60 {
+        return None;
+    }
+    let whole = hour * 3600 + minute * 60 + second;
+    if is(4, b'-') && is(7, b'-') {
+        let (year, month, day) = (number(0, 4)?, number(5, 7)?, number(8, 10)?);
+        let date = jiff::civil::Date::new(year as i16, month as i8, day as i8).ok()?;
+        // Whole seconds first, so that nothing but the fraction is rounded.
+        let seconds = (days_since_1970(date) * 86_400 + i64::from(whole)) as f64 + fraction;
+        return Some(if ended { Moment::Instant(seconds) } else { Moment::Civil(seconds) });
+    }
+    if is(2, b'/') && is(5, b'/') && !ended {
+        let (first, second, year) = (number(0, 2)? as u8, number(3, 5)? as u8, number(6, 10)? as i32);
+        return Some(Moment::Slashed { first, second, year, seconds: f64::from(whole) + fraction });
+    }
+    None
 }
 
 fn days_since_1970(date: jiff::civil::Date) -> i64 {

@@ -58,7 +58,7 @@ impl Recording {
         match (source, names.next(), names.next()) {
             (Some(source), ..) => source,
             (None, Some(sensor), None) if self.description.all_report() => sensor,
-            _ => self.source.name(),
+            _ => self.source.family().name(),
         }
     }
 

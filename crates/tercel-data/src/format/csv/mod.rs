@@ -16,7 +16,7 @@ use crate::options::ReadOptions;
 use crate::remarks::Remarks;
 use crate::sheet::Sheet;
 
-pub(crate) use record::Record;
+use record::Record;
 pub(crate) use rows::Rows;
 pub(crate) use writer::Writer;
 

@@ -30,6 +30,8 @@ pub(crate) struct Rows<'a> {
     /// Number of cells in a row.
     width: usize,
     record: Record,
+    /// Lines of text before the header.
+    preamble: usize,
     stray_quotes: u64,
     comments: u64,
 }
@@ -37,7 +39,7 @@ pub(crate) struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// Looks at the first lines. `columns` are names for a file without header.
     pub fn new(
-        reader: &'a mut dyn std::io::BufRead,
+        mut reader: impl std::io::BufRead + 'a,
         file: &Arc<str>,
         columns: Option<&[String]>,
     ) -> Result<Self, DataError> {
@@ -55,6 +57,7 @@ impl<'a> Rows<'a> {
             line: 0,
             width: 0,
             record: Record::default(),
+            preamble: 0,
             stray_quotes: 0,
             comments: 0,
         };
@@ -83,10 +86,40 @@ impl<'a> Rows<'a> {
             }
         }
         while self.ahead.len() < SAMPLE && self.read_ahead(file)? {}
-        let sample =
-            self.ahead.iter().map(String::as_str).filter(|line| !line.trim().is_empty() && !is_comment(line));
-        self.delimiter = named.unwrap_or_else(|| Delimiter::sniff(sample));
+        self.pass_preamble(named);
         Ok(comment)
+    }
+
+    /// Tells the delimiter, and passes over lines of text before a header, whose cells are fewer than those of the rows.
+    fn pass_preamble(&mut self, named: Option<Delimiter>) {
+        /// A title, a name, a date: more lines than this are no preamble.
+        const LINES: usize = 12;
+        let is_text = |line: &str| !line.trim().is_empty() && !is_comment(line);
+        let told = |from: usize| {
+            let lines =
+                self.ahead.iter().skip(from).map(|line| without_end(line)).filter(|line| is_text(line));
+            let delimiter = named.unwrap_or_else(|| Delimiter::sniff(lines.clone()));
+            let mut record = Record::default();
+            let mut counts = lines.map(|line| {
+                record.split(line, delimiter);
+                record.len()
+            });
+            let first = counts.next().unwrap_or(0);
+            let (all, same) =
+                counts.fold((0, 0), |(all, same), count| (all + 1, same + usize::from(count == first)));
+            (delimiter, first > 1 && same * 2 >= all)
+        };
+        let starts = (0..self.ahead.len().min(LINES)).filter(|at| is_text(&self.ahead[*at]));
+        let found = starts.map(|at| (at, told(at))).find(|(_, (_, even))| *even);
+        let (start, delimiter) =
+            found.map_or_else(|| (0, told(0).0), |(start, (delimiter, _))| (start, delimiter));
+        self.delimiter = delimiter;
+        // Our own tables have nothing before their header.
+        if self.described.is_none() {
+            self.ahead.drain(..start);
+            self.line += start as u64;
+            self.preamble = start;
+        }
     }
 
     /// Takes the header: the first line, unless it holds values; then perhaps the comment before it.
@@ -172,6 +205,11 @@ impl<'a> Rows<'a> {
             format!("there is no header: the first line has {} values and no names", self.width),
             format!("name the {} columns in their order, such as --columns {guess}", self.width),
         ))
+    }
+
+    /// The record that was read last.
+    pub fn record(&self) -> &Record {
+        &self.record
     }
 
     /// The next record and its line, from 1. After an error of one row the next one can be read.
@@ -297,6 +335,9 @@ impl<'a> Rows<'a> {
     /// What is worth saying about the text, once all is read.
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.text.note().into_iter().collect();
+        if self.preamble > 0 {
+            notes.push(format!("{} lines before the header were passed over", self.preamble));
+        }
         if self.stray_quotes > 0 {
             notes.push(format!(
                 "{} rows have a quote that is never closed; it was read as a letter",
