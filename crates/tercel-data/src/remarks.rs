@@ -26,7 +26,7 @@ impl Remarks {
                 self.leave_out(reason, 1);
                 Ok(())
             }
-            None => Err(error),
+            None => Err(with_way_out(error)),
         }
     }
 
@@ -48,4 +48,12 @@ impl Remarks {
             None => self.left_out.push(LeftOut { reason: reason.into(), rows }),
         }
     }
+}
+
+/// An error of one row, with what can be done where nothing better is known.
+fn with_way_out(mut error: DataError) -> DataError {
+    if let DataError::Value { help: help @ None, .. } = &mut error {
+        *help = Some("correct it, or leave such rows out and count them: --on-error skip".into());
+    }
+    error
 }
