@@ -139,7 +139,7 @@ fn without_repetitions(scan: &mut Scan, drop: bool) -> usize {
     if scan.detections.len() < 2 {
         return 0;
     }
-    let mut seen = HashSet::new();
+    let mut seen = HashSet::with_capacity(scan.detections.len());
     let mut repeated = 0;
     scan.detections.retain(|detection| {
         let news = seen.insert(key(detection));
