@@ -221,20 +221,25 @@ fn a_time_in_the_future_costs_no_other_row() {
     let imported = read_with("stream_one_future_time.ndjson", ReadOptions::default());
     assert_eq!(sizes(&imported).iter().sum::<usize>(), 81);
     assert_eq!(imported.detections.scans.len(), 41);
+    noted(&imported, "1 of 41 scans lie");
 }
 
-fn from_text(source: Source, text: &str, name: &str, options: &ReadOptions) -> Result<Imported, DataError> {
-    let options = ImportOptions { read: options.clone(), ..ImportOptions::default() };
-    import_from(source, text.as_bytes(), name, &options)
+fn import_table(text: &str, source: Source, name: &str, read: &ReadOptions) -> Result<Imported, DataError> {
+    import_from(
+        source,
+        text.as_bytes(),
+        name,
+        &ImportOptions { read: read.clone(), ..ImportOptions::default() },
+    )
 }
 
 /// A table in CSV, with what was said about it.
 fn csv(text: &str, options: &ReadOptions) -> Imported {
-    from_text(Source::Csv, text, "a.csv", options).unwrap_or_else(|error| panic!("{error}\n{text}"))
+    import_table(text, Source::Csv, "a.csv", options).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 fn refused(text: &str, options: &ReadOptions) -> String {
-    let error = from_text(Source::Csv, text, "a.csv", options).unwrap_err();
+    let error = import_table(text, Source::Csv, "a.csv", options).unwrap_err();
     format!("{error}\n{}", error.help().unwrap_or_default())
 }
 
@@ -369,7 +374,7 @@ fn numbers_of_scans_may_begin_anew_and_rows_of_a_scan_stand_anywhere() {
 #[test]
 fn json_is_read_in_every_arrangement() {
     let read = |text: &str| {
-        from_text(Source::Ndjson, text, "a.json", &ReadOptions::default())
+        import_table(text, Source::Ndjson, "a.json", &ReadOptions::default())
             .unwrap_or_else(|error| panic!("{error}: {:?}\n{text}", error.help()))
     };
     let plain = read("{\"time\":0,\"x\":1,\"y\":2}\n{\"time\":1,\"x\":3,\"y\":4}\n").detections;
@@ -385,7 +390,7 @@ fn json_is_read_in_every_arrangement() {
     let document = "{\"data\":[{\"time\":0,\"x\":1,\"y\":2},{\"time\":1,\"x\":3,\"y\":4}]}";
     assert_eq!(read(document).detections, plain);
     let nowhere = "{\"time\":0,\"sensor\":\"a\",\"foo\":1,\"bar\":2}\n";
-    let error = from_text(Source::Ndjson, nowhere, "a.json", &ReadOptions::default()).unwrap_err();
+    let error = import_table(nowhere, Source::Ndjson, "a.json", &ReadOptions::default()).unwrap_err();
     assert!(error.to_string().contains("the keys are `bar`, `foo`, `sensor`, `time`"), "{error}");
 }
 
@@ -408,4 +413,18 @@ fn lines_before_the_header_are_passed_over_and_told() {
         csv("Radar export\nStation 5, north\n\ntime,x,y\n0,1,2\n1,1,2\n2,1,2\n", &ReadOptions::default());
     assert_eq!(times(&imported), [0.0, 1.0, 2.0]);
     noted(&imported, "3 lines before the header");
+}
+
+#[test]
+fn a_file_with_two_kinds_of_position_uses_the_local_one_and_says_so() {
+    let imported = csv("time,x,y,lat,lon\n0,1,2,47,8\n", &ReadOptions::default());
+    assert_eq!(positions(&imported), [[1.0, 2.0]]);
+    noted(&imported, "latitude and longitude are not used");
+    let line = "{\"time\":0,\"x\":1,\"y\":2,\"lat\":47,\"lon\":8}\n";
+    let imported = import_table(line, Source::Ndjson, "a", &ReadOptions::default()).unwrap();
+    assert_eq!(positions(&imported), [[1.0, 2.0]]);
+    noted(&imported, "latitude and longitude are not used");
+    let ignore = vec!["x".to_owned(), "y".to_owned()];
+    let imported = csv("time,x,y,lat,lon\n0,1,2,47,8\n", &ReadOptions { ignore, ..ReadOptions::default() });
+    assert!(imported.detections.origin.is_some());
 }

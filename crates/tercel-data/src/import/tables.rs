@@ -61,7 +61,7 @@ fn join(mut whole: Imported, mut part: Imported, path: &Path) -> Result<Imported
         return Err(DataError::Metadata {
             file: crate::format::file_name(path),
             problem: "the origin is another one than in the file before".to_owned(),
-            help: "bring in the files one by one".to_owned(),
+            help: "convert the recordings with one --origin, or give the recordings themselves".to_owned(),
         });
     }
     // A file without scans says nothing of the others.
@@ -86,6 +86,7 @@ fn join(mut whole: Imported, mut part: Imported, path: &Path) -> Result<Imported
             None => whole.left_out.push(LeftOut { reason, rows }),
         }
     }
-    whole.notes.extend(part.notes);
+    let news: Vec<String> = part.notes.into_iter().filter(|note| !whole.notes.contains(note)).collect();
+    whole.notes.extend(news);
     Ok(whole)
 }
