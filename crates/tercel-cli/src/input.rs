@@ -6,8 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, Bearings, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import, import_from,
-    read_truths,
+    Angles, Bearings, ImportOptions, Imported, ReadOptions, Source, Unit, import, import_from, read_truths,
 };
 
 use crate::console::Console;
@@ -20,7 +19,6 @@ pub const STDIN: &str = "standard input";
 
 /// How an input file is read.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Reading")]
 pub struct ReadArguments {
     /// What the input is; without it, its name and its first line tell.
     #[arg(long, value_name = "FORMAT", value_parser = source_parser())]
@@ -58,12 +56,25 @@ pub struct ReadArguments {
     /// What stands first in dates such as 05/03/2024.
     #[arg(long, value_enum, value_name = "ORDER")]
     pub date_order: Option<DateOrder>,
+    /// What becomes of a row, a line or a scan that cannot be used.
+    #[arg(long, value_enum, default_value_t, value_name = "WHAT")]
+    pub on_error: OnError,
     /// Leave out rows that repeat another row of their scan.
     #[arg(long)]
     pub drop_repeated: bool,
     /// Keep base stations, aids to navigation and aircraft among the ships (ais, nmea).
     #[arg(long)]
     pub all_stations: bool,
+}
+
+/// What becomes of a row that cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum OnError {
+    /// The program ends with exit code 3; of a stream, after the tracks so far are written.
+    #[default]
+    Fail,
+    /// It is left out and counted, with a warning for each line of a stream.
+    Skip,
 }
 
 /// A unit of angles.
@@ -113,7 +124,9 @@ pub enum DateOrder {
 
 fn pair(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
-        Some((column, name)) if !column.is_empty() && !name.is_empty() => Ok((column.trim().to_owned(), name.to_owned())),
+        Some((column, name)) if !column.is_empty() && !name.is_empty() => {
+            Ok((column.trim().to_owned(), name.to_owned()))
+        }
         _ => Err("expected COLUMN=NAME, such as x=east_m".to_owned()),
     }
 }
@@ -159,7 +172,10 @@ impl ReadArguments {
                 DateOrder::DayFirst => tercel_data::DateOrder::DayFirst,
                 DateOrder::MonthFirst => tercel_data::DateOrder::MonthFirst,
             }),
-            on_error: OnError::Fail,
+            on_error: match self.on_error {
+                OnError::Fail => tercel_data::OnError::Fail,
+                OnError::Skip => tercel_data::OnError::Skip,
+            },
             drop_repeated: self.drop_repeated,
             origin: None,
         }

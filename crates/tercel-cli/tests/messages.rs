@@ -57,7 +57,6 @@ fn arguments_that_do_not_fit_end_with_2() {
         ("usage_from", &["convert", "radar.csv", "--from", "asterix"]),
         ("usage_cutoff", &["evaluate", "radar.csv", "--truth", "truth.csv", "--cutoff", "-3"]),
         ("usage_no_truth", &["evaluate", "radar.csv"]),
-        ("usage_skip", &["track", "radar.csv", "--on-error", "skip"]),
         ("usage_preset", &["config", "init", "--preset", "nope"]),
         ("usage_origin", &["convert", "radar.csv", "--origin", "95,8"]),
         ("usage_stdin_of_another_program", &["track", "-", "--from", "autoferry"]),

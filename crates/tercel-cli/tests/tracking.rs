@@ -58,19 +58,19 @@ fn every_detection_is_accounted_for() {
 }
 
 #[test]
-fn late_and_ignored_scans_are_counted_with_their_detections() {
+fn a_file_is_sorted_and_ignored_scans_are_counted_with_their_detections() {
     let folder = tempfile::tempdir().unwrap();
-    let table = folder.path().join("late.csv");
+    let table = folder.path().join("unsorted.csv");
     std::fs::write(
         &table,
         "time,sensor,x,y\n0,radar,0,0\n2,radar,1,0\n1,radar,1,0\n1,radar,9,9\n3,camera,1,1\n3,radar,1,0\n",
     )
     .unwrap();
     let summary = run(["track", text(&table), "--json"].into_iter().chain(CONFIG)).succeeded().json();
-    let scans = serde_json::json!({"read": 5, "tracked": 3, "late": 1, "ignored": 1, "bad": 0});
+    let scans = serde_json::json!({"read": 5, "tracked": 4, "late": 0, "ignored": 1, "bad": 0});
     assert_eq!(summary["scans"], scans);
-    assert_eq!(summary["detections"]["left_out"], 3);
-    assert_eq!(summary["detections"]["tracked"], 3);
+    assert_eq!(summary["detections"]["left_out"], 1);
+    assert_eq!(summary["detections"]["tracked"], 5);
 }
 
 #[test]

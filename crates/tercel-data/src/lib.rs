@@ -20,7 +20,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Readers refuse what does not fit, and say where it stands, what was expected and what helps ([`DataError`]).
+//! Tables of other programs may have other names, units, times and dialects; [`ReadOptions`] say what their content
+//! does not tell. Readers refuse what does not fit, and say where it stands, what was expected and what helps ([`DataError`]).
 //! Writers put a file in its place only when it is complete ([`AtomicFile`]).
 
 mod column;

@@ -1,7 +1,8 @@
 //! Detections in and tracks out, line by line, while they are made.
 //!
-//! Every line is one JSON object whose keys are the columns of the table. Empty lines are passed over, and so are
-//! keys that are no columns. A line of the form `{"tercel": {...}}` describes the table (units, origin).
+//! Every line is one JSON object whose keys are the columns of the table, or usual names that mean the same. Empty lines
+//! are passed over. Keys that mean nothing are told by [`Scans::notes`]; a line without any key that holds a position is an
+//! error. The list may go by another usual name (`objects`, `targets`, ...). A line of the form `{"tercel": {...}}` describes the table (units, origin).
 //!
 //! **One line per scan.** The object has `time`, `sensor`, possibly `sensor_x`, `sensor_y`, `sensor_z` and
 //! `scan`, and a list `detections`, whose objects have the other columns. An empty list is a scan in which nothing

@@ -62,12 +62,15 @@ fn from_stream<T: Layout>(
     read_table(reader.as_mut(), format, &file, options, &mut Remarks::new(options.on_error))
 }
 
-/// Reads detections from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+/// Reads detections from a CSV, Parquet or JSON file, compressed or not.
 ///
-/// Of the columns only `time`, `sensor` and either `x` and `y` or `bearing` are needed. Rows of one scan follow
-/// each other and have the same number in `scan`; without that column, the same time and sensor. Where there is a
+/// Of the columns only `time` and either `x` and `y`, `bearing`, or `latitude` and `longitude` are needed; usual other
+/// names are known, and [`ReadOptions`] say the rest. Rows of one scan may stand anywhere: they have the same sensor and
+/// number in `scan`; without that column, the same time and sensor. Scans come in the order of time. Where there is a
 /// column `detection`, a row without a number in it is a scan in which nothing was seen; without that column, a
 /// row without a measurement is.
+///
+/// What was decided and left out on the way is told by [`import()`](crate::import()), which reads the same.
 ///
 /// # Errors
 /// A [`DataError`] that says where the file is wrong, and what was expected.
@@ -88,7 +91,7 @@ pub fn read_detections_from(
     from_stream(reader, format, name, options)
 }
 
-/// Reads the truth from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+/// Reads the truth from a CSV, Parquet or JSON file, compressed or not.
 ///
 /// The columns `time`, `object`, `x` and `y` are needed.
 ///
@@ -111,7 +114,7 @@ pub fn read_truths_from(
     from_stream(reader, format, name, options)
 }
 
-/// Reads tracks from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+/// Reads tracks from a CSV, Parquet or JSON file, compressed or not.
 ///
 /// Tracks of other programs need the columns `time`, `track`, `x` and `y` only: a missing status is read as
 /// confirmed, a missing existence probability as 1, and a missing covariance is empty.
@@ -135,7 +138,7 @@ pub fn read_tracks_from(
     from_stream(reader, format, name, options)
 }
 
-/// Reads metrics from a CSV, Parquet or NDJSON file, compressed by gzip or not.
+/// Reads metrics from a CSV, Parquet or JSON file, compressed or not.
 ///
 /// An empty `value` is not a number.
 ///

@@ -28,7 +28,7 @@ impl Remarks {
                 self.leave_out(reason, 1);
                 Ok(())
             }
-            None => Err(error),
+            None => Err(with_way_out(error)),
         }
     }
 
@@ -66,4 +66,12 @@ impl Remarks {
         }
         other.notes.into_iter().for_each(|note| self.note(note));
     }
+}
+
+/// An error of one row, with what can be done where nothing better is known.
+fn with_way_out(mut error: DataError) -> DataError {
+    if let DataError::Value { help: help @ None, .. } = &mut error {
+        *help = Some("correct it, or leave such rows out and count them: --on-error skip".into());
+    }
+    error
 }

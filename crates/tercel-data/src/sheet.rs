@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::column::{Column, Conversion, Kind};
 use crate::error::{DataError, Place, Refusal, Spot};
 use crate::remarks::Remarks;
-use crate::time::{Clock, Moment, Times};
+use crate::time::{Clock, Moment};
 
 /// Columns of equal length, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -187,6 +187,7 @@ impl Values {
 fn is_nothing(text: &str) -> bool {
     let text = text.trim();
     text.len() <= 4
+        && !text.starts_with(|c: char| c.is_ascii_digit())
         && ["", "nan", "null", "none", "na", "n/a", "#n/a", "-", "--"]
             .iter()
             .any(|word| text.eq_ignore_ascii_case(word))
@@ -283,12 +284,12 @@ impl Sheet {
     }
 
     /// The times of the file, before they are settled.
-    pub fn times(&self) -> Times<'_> {
+    pub fn times(&self) -> &[Option<Moment>] {
         let times = self.values.iter().find_map(|values| match values {
             Values::Time(cells) => Some(cells.as_slice()),
             _ => None,
         });
-        Times { cells: times.unwrap_or_default() }
+        times.unwrap_or_default()
     }
 
     /// Where a row stands in `file`.

@@ -221,6 +221,7 @@ fn a_time_in_the_future_costs_no_other_row() {
     let imported = read_with("stream_one_future_time.ndjson", ReadOptions::default());
     assert_eq!(sizes(&imported).iter().sum::<usize>(), 81);
     assert_eq!(imported.detections.scans.len(), 41);
+    noted(&imported, "1 of 41 scans lie");
 }
 
 /// A table in CSV, with what was said about it.
@@ -405,4 +406,18 @@ fn lines_before_the_header_are_passed_over_and_told() {
         csv("Radar export\nStation 5, north\n\ntime,x,y\n0,1,2\n1,1,2\n2,1,2\n", &ReadOptions::default());
     assert_eq!(times(&imported), [0.0, 1.0, 2.0]);
     noted(&imported, "3 lines before the header");
+}
+
+#[test]
+fn a_file_with_two_kinds_of_position_uses_the_local_one_and_says_so() {
+    let imported = csv("time,x,y,lat,lon\n0,1,2,47,8\n", &ReadOptions::default());
+    assert_eq!(positions(&imported), [[1.0, 2.0]]);
+    noted(&imported, "latitude and longitude are not used");
+    let line = "{\"time\":0,\"x\":1,\"y\":2,\"lat\":47,\"lon\":8}\n";
+    let imported = import_table_from(line.as_bytes(), Format::Ndjson, "a", &ReadOptions::default()).unwrap();
+    assert_eq!(positions(&imported), [[1.0, 2.0]]);
+    noted(&imported, "latitude and longitude are not used");
+    let ignore = vec!["x".to_owned(), "y".to_owned()];
+    let imported = csv("time,x,y,lat,lon\n0,1,2,47,8\n", &ReadOptions { ignore, ..ReadOptions::default() });
+    assert!(imported.detections.origin.is_some());
 }

@@ -26,11 +26,11 @@ pub(crate) use crate::source::{decompressed, file_name, open, read_error};
 /// A format in which every table can be read and written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Format {
-    /// Comma-separated values with a header. The first line may describe the table: `# tercel: {...}`.
+    /// Text in cells, separated by commas or otherwise. The first line may describe the table: `# tercel: {...}`.
     Csv,
     /// Apache Parquet. The key `tercel` of the file's metadata describes the table.
     Parquet,
-    /// One JSON object per line. The first may describe the table: `{"tercel": {...}}`.
+    /// JSON objects, one per line or in an array. The first may describe the table: `{"tercel": {...}}`.
     Ndjson,
 }
 
@@ -210,7 +210,7 @@ pub(crate) fn read_table<T: Layout>(
         Format::Ndjson => json::read::<T>(reader, file, options, remarks)?,
     };
     let mut clock = Clock::new(options, time_unit, file)?;
-    let looked = clock.look_at(&sheet.times());
+    let looked = clock.look_at(sheet.times());
     remarks
         .notes
         .extend(looked.map_err(|(problem, help)| DataError::unsettled(Place::whole(file), problem, help))?);

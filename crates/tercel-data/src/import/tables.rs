@@ -81,6 +81,7 @@ fn join(mut whole: Imported, part: Imported, path: &Path) -> Result<Imported, Da
             None => whole.left_out.push(LeftOut { reason, rows }),
         }
     }
-    whole.notes.extend(part.notes);
+    let news: Vec<String> = part.notes.into_iter().filter(|note| !whole.notes.contains(note)).collect();
+    whole.notes.extend(news);
     Ok(whole)
 }

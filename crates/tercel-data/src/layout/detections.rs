@@ -91,15 +91,23 @@ impl Layout for Detections {
         let reader = Rows::new(sheet, context, frame.as_ref());
         reader.check_columns()?;
         let mut rows = Vec::with_capacity(sheet.len());
-        let mut ids = HashSet::new();
+        let (mut next, mut ids) = (0, HashSet::new());
+        // Detections that are numbered here are not numbered twice.
+        let numbered = sheet.counts("detection").present();
         for row in 0..sheet.len() {
-            let place = || sheet.place(context.file, row);
-            let read = reader.read(row, ids.len() as u64).and_then(|read| match &read.detection {
-                Some(detection) if !ids.insert(detection.id) => Err(repeated(place(), detection.id)),
+            let read = reader.read(row, next).and_then(|read| match &read.detection {
+                Some(detection) if numbered && !ids.insert(detection.id) => {
+                    Err(repeated(sheet.place(context.file, row), detection.id))
+                }
                 _ => Ok(read),
             });
             match read {
-                Ok(read) => rows.push((read, row)),
+                Ok(read) => {
+                    if let Some(detection) = &read.detection {
+                        next = next.max(detection.id.saturating_add(1));
+                    }
+                    rows.push((read, row));
+                }
                 Err(error) => remarks.refuse(error)?,
             }
         }

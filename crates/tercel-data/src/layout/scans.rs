@@ -26,6 +26,7 @@ pub(super) fn scans(
 ) -> Result<Vec<Scan>, DataError> {
     let groups = groups(&rows);
     remarks.notes.extend(out_of_order(&rows, &groups));
+    remarks.notes.extend(gap(&groups));
     let count = rows.len();
     let mut rows: Vec<Option<(DetectionRow, usize)>> = rows.into_iter().map(Some).collect();
     let mut repeated = 0;
@@ -111,12 +112,34 @@ fn out_of_order(rows: &[(DetectionRow, usize)], groups: &[Group]) -> Option<Stri
     })
 }
 
+/// Says when some scans lie far from all others: their times may be wrong.
+fn gap(groups: &[Group]) -> Option<String> {
+    const FEWEST: usize = 10;
+    const FAR: f64 = 100.0;
+    const HOUR: f64 = 3600.0;
+    let (first, last) = (groups.first()?.time, groups.last()?.time);
+    let widest = |one: &usize, other: &usize| {
+        let width = |at: usize| groups[at + 1].time - groups[at].time;
+        width(*one).total_cmp(&width(*other))
+    };
+    let at = (0..groups.len() - 1).max_by(widest)?;
+    let gap = groups[at + 1].time - groups[at].time;
+    let rest = last - first - gap;
+    let fewer = (at + 1).min(groups.len() - at - 1);
+    (groups.len() >= FEWEST && gap > HOUR && gap > FAR * rest).then(|| {
+        format!(
+            "{fewer} of {} scans lie {gap:.0} s apart from the others; their times may be wrong",
+            groups.len()
+        )
+    })
+}
+
 /// Counts detections that are there already, and takes them out if that is wanted.
 fn without_repetitions(scan: &mut Scan, drop: bool) -> usize {
     if scan.detections.len() < 2 {
         return 0;
     }
-    let mut seen = HashSet::new();
+    let mut seen = HashSet::with_capacity(scan.detections.len());
     let mut repeated = 0;
     scan.detections.retain(|detection| {
         let news = seen.insert(key(detection));

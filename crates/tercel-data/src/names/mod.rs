@@ -287,27 +287,31 @@ impl Naming {
         }
     }
 
-    /// Of a position in the local frame and one on the Earth the first is taken.
+    /// Of what the sensor measured in its own frame and a position on the Earth the first is taken.
     fn prefer_local(&self, found: &[String], choice: &mut Choice) {
         let has = |choice: &Choice, name| {
             choice.used.iter().any(|(_, meaning)| self.columns[meaning.column].name == name)
         };
-        if !(has(choice, "x") && has(choice, "y") && has(choice, "latitude") && has(choice, "longitude")) {
+        let local = (has(choice, "x") && has(choice, "y")) || has(choice, "bearing");
+        if !(local && has(choice, "latitude") && has(choice, "longitude")) {
             return;
         }
         choice.used.retain(|(at, meaning)| {
-            let geographic = ["latitude", "longitude"].contains(&self.columns[meaning.column].name.as_ref());
+            let geographic = GEOGRAPHIC.contains(&self.columns[meaning.column].name.as_ref());
             if geographic {
                 choice.unused.push(found[*at].clone());
             }
             !geographic
         });
-        choice.notes.push(
-            "the file has positions in a plane and on the Earth; the first are taken; --ignore x --ignore y for the others"
-                .to_owned(),
-        );
+        choice.notes.push(BOTH_PLACES.to_owned());
     }
 }
+
+/// Columns of a position on the Earth.
+pub(crate) const GEOGRAPHIC: [&str; 2] = ["latitude", "longitude"];
+
+/// What is said when a file has positions of both kinds.
+pub(crate) const BOTH_PLACES: &str = "latitude and longitude are not used, since the file has a local position or a bearing as well; --ignore NAME passes over those";
 
 /// The unit in which a column comes when nothing says otherwise, where that is not the SI unit.
 fn usual_unit(word: &str, column: &str, angles: Angles) -> Option<Unit> {

@@ -48,11 +48,7 @@ const DETECTIONS: [Entry; 18] = [
         &[],
         &["sensor_name", "sensor_id", "radar", "radar_id", "receiver", "station", "site", "source"],
     ),
-    (
-        "scan",
-        &[],
-        &["scan_number", "scan_id", "scan_no", "sweep", "sweep_id", "frame", "frame_id", "frame_number"],
-    ),
+    ("scan", &[], &["scan_number", "scan_id", "scan_no", "sweep", "sweep_id", "frame", "frame_number"]),
     ("x", &["pos_x", "x_pos", "position_x", "x_position", "east", "easting", "x_east", "east_x", "px"], &[]),
     (
         "y",

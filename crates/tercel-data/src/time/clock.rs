@@ -31,11 +31,6 @@ pub(crate) struct Clock {
     civil: bool,
 }
 
-/// A column of times.
-pub(crate) struct Times<'a> {
-    pub cells: &'a [Option<Moment>],
-}
-
 impl Clock {
     /// Times under these options; `unit` is that of the name of the column.
     pub fn new(options: &ReadOptions, unit: Option<Unit>, file: &Arc<str>) -> Result<Self, DataError> {
@@ -56,12 +51,12 @@ impl Clock {
     }
 
     /// Looks at a whole column, so that what one time leaves open the others tell. Returns what the user should know.
-    pub fn look_at(&mut self, times: &Times<'_>) -> Result<Vec<String>, Trouble> {
+    pub fn look_at(&mut self, times: &[Option<Moment>]) -> Result<Vec<String>, Trouble> {
         let mut notes = Vec::new();
         if self.unit.is_none() {
             /// As many tell as well as all.
             const LOOKED_AT: usize = 20_000;
-            let numbers = times.cells.iter().flatten().filter_map(|moment| match moment {
+            let numbers = times.iter().flatten().filter_map(|moment| match moment {
                 Moment::Number(number) if number.is_finite() => Some(*number),
                 _ => None,
             });
@@ -73,9 +68,9 @@ impl Clock {
             }
         }
         if self.order.is_none() {
-            self.order = order(times.cells.iter().flatten())?;
+            self.order = order(times.iter().flatten())?;
         }
-        if times.cells.iter().flatten().any(|moment| matches!(moment, Moment::OfDay(_))) {
+        if times.iter().flatten().any(|moment| matches!(moment, Moment::OfDay(_))) {
             notes.push(
                 "the times are times of day; where they go back at midnight the next day begins".to_owned(),
             );

@@ -5,5 +5,5 @@ mod moment;
 mod unit;
 mod zone;
 
-pub(crate) use clock::{Clock, Times};
+pub(crate) use clock::Clock;
 pub(crate) use moment::Moment;

@@ -203,7 +203,7 @@ fn compact(text: &str) -> Option<Moment> {
     };
     let rest = &text[time + 6..];
     // Of numbers only those of 14 digits are dates.
-    if !plainly && !(rest.is_empty() || rest.eq_ignore_ascii_case("z")) {
+    if !(plainly || rest.is_empty() || rest.eq_ignore_ascii_case("z")) {
         return None;
     }
     let number = |from: usize, to: usize| text.get(from..to)?.parse::<u32>().ok();

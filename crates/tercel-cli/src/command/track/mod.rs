@@ -16,7 +16,7 @@ use self::run::Run;
 use super::config;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::input::{self, ReadArguments, STDIN, is_stdin, note_left_out};
+use crate::input::{self, OnError, ReadArguments, STDIN, is_stdin, note_left_out};
 use crate::output::{Target, keep_inputs};
 use crate::progress::Progress;
 use crate::score::ScoreArguments;
@@ -57,21 +57,8 @@ pub struct TrackArguments {
     /// Print the summary as one JSON object.
     #[arg(long)]
     json: bool,
-    /// With NDJSON on standard input: what becomes of a line or a scan that cannot be used.
-    #[arg(long, value_enum, default_value_t, value_name = "WHAT")]
-    on_error: OnError,
     #[command(flatten)]
     score: ScoreArguments,
-}
-
-/// What becomes of a line of standard input that cannot be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-enum OnError {
-    /// The program ends with exit code 3, after the tracks so far are written.
-    #[default]
-    Fail,
-    /// It is counted, a warning is printed, and the next line is read.
-    Skip,
 }
 
 const AFTER: &str = "\
@@ -86,10 +73,6 @@ impl TrackArguments {
     pub fn run(&self, console: &Console) -> Result<(), Failure> {
         self.check()?;
         let stream = is_stdin(&self.input) && matches!(self.read.from, None | Some(Source::Ndjson));
-        if self.on_error == OnError::Skip && !stream {
-            let message = "--on-error skip is for NDJSON on standard input";
-            return Err(Failure::usage(message));
-        }
         let outcome = if stream { self.run_stream(console)? } else { self.run_file(console)? };
         outcome.write(self, console)
     }
@@ -161,7 +144,7 @@ impl TrackArguments {
             run.begin(scans.origin())?;
             match self.track_one(&mut run, scan)? {
                 Ok(()) => {}
-                Err(failure) if self.on_error == OnError::Skip => {
+                Err(failure) if self.read.on_error == OnError::Skip => {
                     bad += 1;
                     if let Some(report) = failure.report() {
                         console.warn(format_args!("left out: {}", report.message));
@@ -171,6 +154,9 @@ impl TrackArguments {
             }
         }
         run.begin(scans.origin())?;
+        for note in scans.notes() {
+            console.note(note);
+        }
         let rows = run.end().map_err(|error| self.refused(error))?;
         run.hand_on(rows)?;
         Ok(Outcome { run, truths, config, configuration: name, bad })

@@ -109,17 +109,20 @@ impl<'a> Rows<'a> {
                 counts.fold((0, 0), |(all, same), count| (all + 1, same + usize::from(count == first)));
             (delimiter, first > 1 && same * 2 >= all)
         };
+        // Our own tables begin with their header, and names in their cells may be anything.
+        if self.described.is_some() {
+            let header = self.ahead.front().map(|line| without_end(line));
+            self.delimiter = named.unwrap_or_else(|| Delimiter::sniff(header.into_iter()));
+            return;
+        }
         let starts = (0..self.ahead.len().min(LINES)).filter(|at| is_text(&self.ahead[*at]));
         let found = starts.map(|at| (at, told(at))).find(|(_, (_, even))| *even);
         let (start, delimiter) =
             found.map_or_else(|| (0, told(0).0), |(start, (delimiter, _))| (start, delimiter));
         self.delimiter = delimiter;
-        // Our own tables have nothing before their header.
-        if self.described.is_none() {
-            self.ahead.drain(..start);
-            self.line += start as u64;
-            self.preamble = start;
-        }
+        self.ahead.drain(..start);
+        self.line += start as u64;
+        self.preamble = start;
     }
 
     /// Takes the header: the first line, unless it holds values; then perhaps the comment before it.

@@ -8,7 +8,7 @@ use super::passed_over;
 use crate::column::{Column, Conversion};
 use crate::error::{DataError, Place, Refusal};
 use crate::layout::{missing_columns, near_miss};
-use crate::names::{Meaning, Naming};
+use crate::names::{BOTH_PLACES, GEOGRAPHIC, Meaning, Naming};
 use crate::options::ReadOptions;
 use crate::sheet::{Sheet, Values};
 use crate::unit::Unit;
@@ -140,6 +140,7 @@ impl Keys {
         self.fill(object, "", &mut slots, place)?;
         let Some((key, list)) = list else {
             self.check_measured(object, &slots, place)?;
+            self.prefer_local(&mut slots);
             self.push(&slots, object, place, sheet)?;
             return Ok(Taken { rows: 1, whole: false });
         };
@@ -162,6 +163,7 @@ impl Keys {
             if !self.measured(&slots).any(|value| !value.is_null()) {
                 return Err(self.nowhere(detection, place, "a detection has no measurement"));
             }
+            self.prefer_local(&mut slots);
             self.push(&slots, object, place, sheet)?;
         }
         if list.is_empty() {
@@ -326,6 +328,22 @@ impl Keys {
         columns
             .filter(|(column, _)| MEASURED.contains(&column.name.as_ref()))
             .filter_map(|(_, slot)| slot.map(|slot| slot.value))
+    }
+
+    /// Forgets a position on the Earth beside one in the local frame or a bearing.
+    fn prefer_local(&mut self, slots: &mut [Option<Slot<'_>>]) {
+        let columns = self.naming.columns();
+        let at = |name: &str| columns.iter().position(|column| column.name == name);
+        let known = |name: &str| {
+            at(name).and_then(|at| slots.get(at).copied().flatten()).is_some_and(|slot| !slot.value.is_null())
+        };
+        let both = known("latitude") && ((known("x") && known("y")) || known("bearing"));
+        if both {
+            for at in GEOGRAPHIC.iter().filter_map(|name| at(name)).collect::<Vec<_>>() {
+                slots[at] = None;
+            }
+            self.remember_note(BOTH_PLACES.to_owned());
+        }
     }
 
     /// Refuses an object that seems to say more than that nothing was seen.

@@ -153,6 +153,9 @@ impl<R: BufRead> Iterator for Lines<R> {
             match self.advance() {
                 Ok(true) if self.buffer.iter().all(u8::is_ascii_whitespace) => {}
                 Ok(true) => {
+                    if self.begins && self.buffer.starts_with(b"\xef\xbb\xbf") {
+                        self.buffer.drain(..3);
+                    }
                     let first = std::mem::replace(&mut self.begins, false);
                     if !(first && self.is_document()) {
                         return Some(self.parse(first));
