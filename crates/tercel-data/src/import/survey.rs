@@ -124,7 +124,7 @@ impl<T> Sample<T> {
     const MOST: usize = 1 << 18;
 
     fn add(&mut self, value: T) {
-        if self.seen % self.every == 0 {
+        if self.seen.is_multiple_of(self.every) {
             if self.kept.len() == Self::MOST {
                 let mut at = 0;
                 self.kept.retain(|_| {
@@ -133,7 +133,7 @@ impl<T> Sample<T> {
                 });
                 self.every *= 2;
             }
-            if self.seen % self.every == 0 {
+            if self.seen.is_multiple_of(self.every) {
                 self.kept.push(value);
             }
         }

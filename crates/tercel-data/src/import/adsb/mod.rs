@@ -131,7 +131,8 @@ impl Aircraft {
         let table = open()?;
         let field = |names| table.field(names);
         let (latitude, longitude, position) = (field(&LATITUDE), field(&LONGITUDE), field(&POSITION));
-        if !position.present() && !(latitude.present() && longitude.present()) {
+        let both = latitude.present() && longitude.present();
+        if !both && !position.present() {
             let needed = [(&LATITUDE, &latitude), (&LONGITUDE, &longitude)];
             let missing = needed.iter().filter(|(_, field)| !field.present());
             return Err(table.missing(&missing.map(|(names, _)| *names).collect::<Vec<_>>()));

@@ -51,8 +51,8 @@ impl Message {
             27 => from_afar(&bits)?,
             4 | 11 => place(&bits, (79, 28), (107, 27), MINUTES)?.map(|place| at(place, None)),
             21 => place(&bits, (164, 28), (192, 27), MINUTES)?.map(|place| at(place, None)),
-            1..=27 => None,
-            _ => return None,
+            0 | 28.. => return None,
+            _ => None,
         };
         Some(Message { kind, mmsi, position })
     }

@@ -74,7 +74,7 @@ fn time_before(before: &str) -> Result<Option<f64>, &'static str> {
 
 /// The time among the fields after the checksum: the last one that is a time.
 fn time_after(after: &str) -> Option<f64> {
-    after.split([',', ';', '\t']).rev().find_map(|field| moment(field))
+    after.split([',', ';', '\t']).rev().find_map(moment)
 }
 
 /// A time of receipt. Smaller numbers are counters and signal strengths, and a date alone is only a part of a time.

@@ -55,6 +55,9 @@ const POLL: &str = "poll";
 /// Rows whose keys are looked at to know the columns of objects that have any.
 const SAMPLE: usize = 1000;
 
+/// A row that was read ahead and its line, or why it cannot be used.
+type Ahead = Result<(Map<String, Value>, u64), DataError>;
+
 /// The rows of JSON documents.
 pub(super) struct JsonRows {
     text: Text<'static>,
@@ -63,7 +66,7 @@ pub(super) struct JsonRows {
     names: Vec<String>,
     columns: HashMap<String, usize>,
     /// Rows that were read and not taken yet, with their lines.
-    ahead: VecDeque<Result<(Map<String, Value>, u64), DataError>>,
+    ahead: VecDeque<Ahead>,
     row: Vec<Value>,
     /// Line of the row that was taken, and of the last that was read.
     line: u64,

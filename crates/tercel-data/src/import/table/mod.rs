@@ -217,7 +217,7 @@ impl Table {
 
     fn latitude_of(&self, field: &Field, degrees: Option<f64>) -> Result<Option<f64>, DataError> {
         match degrees {
-            Some(value) if value == 91.0 => Ok(None),
+            Some(91.0) => Ok(None),
             Some(value) if value.abs() > 90.0 => {
                 Err(self.refuse(field, Refusal::new(value, "degrees in [-90, 90]").helped(SKIP)))
             }
@@ -227,7 +227,7 @@ impl Table {
 
     fn longitude_of(&self, field: &Field, degrees: Option<f64>) -> Result<Option<f64>, DataError> {
         match degrees {
-            Some(value) if value == 181.0 => Ok(None),
+            Some(181.0) => Ok(None),
             Some(value) if !(-180.0..=360.0).contains(&value) => {
                 Err(self.refuse(field, Refusal::new(value, "degrees in [-180, 180]").helped(SKIP)))
             }
