@@ -157,6 +157,7 @@ fn a_row_without_measurement_says_nothing_and_is_told() {
 #[test]
 fn other_names_of_the_columns_are_known() {
     let imported = read_with("xy_timestamp_column.csv", ReadOptions::default());
+    noted(&imported, "no column names the sensor");
     assert_eq!(sizes(&imported), [2; 20]);
 }
 
@@ -282,7 +283,8 @@ fn columns_go_by_the_names_that_are_said() {
 #[test]
 fn identities_are_known_and_doubtful_ones_are_told() {
     let identity = |header: &str| {
-        let imported = csv(&format!("time,x,y,{header}\n0,1,2,219000101\n"), &ReadOptions::default());
+        let options = ReadOptions { sensor: Some("radar".into()), ..ReadOptions::default() };
+        let imported = csv(&format!("time,x,y,{header}\n0,1,2,219000101\n"), &options);
         (imported.detections.scans[0].detections[0].identity.clone(), imported.notes)
     };
     for name in ["identity", "hex", "ICAO24", "Mode S"] {
