@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use tercel_data::table::Observation;
 use tercel_data::{
     Angles, Bearings, DateOrder, Format, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import,
-    import_table_from, read_detections_from,
+    import_table_from, read_detections_from, write_detections_to,
 };
 
 fn path(name: &str) -> PathBuf {
@@ -422,4 +422,25 @@ fn a_file_with_two_kinds_of_position_uses_the_local_one_and_says_so() {
     let ignore = vec!["x".to_owned(), "y".to_owned()];
     let imported = csv("time,x,y,lat,lon\n0,1,2,47,8\n", &ReadOptions { ignore, ..ReadOptions::default() });
     assert!(imported.detections.origin.is_some());
+}
+
+#[test]
+fn what_was_read_is_written_and_read_back_the_same() {
+    let options = ReadOptions::default();
+    for text in [
+        "time,scan,x,y\n1,0,,\n0,0,1,2\n2,0,,\n0.5,0,3,4\n3,1,1,2\n",
+        "time,sensor,lat,lon\n0,a,47,8\n1,b,47.1,8.1\n0,b,47.1,8\n",
+        "time,range (km),azimuth [deg]\n3,1,10\n1,2,350\n1,2,350\n",
+    ] {
+        let table = csv(text, &options).detections;
+        for format in [Format::Csv, Format::Ndjson, Format::Parquet] {
+            let mut bytes = Vec::new();
+            write_detections_to(&mut bytes, format, "a", &table).unwrap();
+            assert_eq!(
+                read_detections_from(bytes.as_slice(), format, "a", &options).unwrap(),
+                table,
+                "{text}"
+            );
+        }
+    }
 }
