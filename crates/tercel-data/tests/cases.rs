@@ -73,6 +73,7 @@ fn every_dialect_says_the_same() {
         "  time   sensor  x     y\n   0.5    radar  1.5  -2\n   1.5    radar  3     4.25\n",
         "# made by hand\n# time sensor x y\n0.5 radar 1.5 -2\n1.5 radar 3 4.25\n",
         "\"time\",\"sensor\",\"x\",\"y\"\n\"0.5\",\"radar\",\"1.5\",\"-2\"\n\"1.5\",\"radar\",\"3\",\"4.25\"\n",
+        "time,sensor,x,y\r0.5,radar,1.5,-2\r1.5,radar,3,4.25\r",
         "time,sensor,x,y,\n0.5,radar,1.5,-2,\n1.5,radar,3,4.25,\n",
     ] {
         assert_eq!(read(text), plain, "{text}");
@@ -443,4 +444,10 @@ fn what_was_read_is_written_and_read_back_the_same() {
             );
         }
     }
+}
+
+#[test]
+fn a_web_page_is_no_table() {
+    let error = refused("<!DOCTYPE html><html><body>404</body></html>", &ReadOptions::default());
+    assert!(error.contains("a web page"), "{error}");
 }

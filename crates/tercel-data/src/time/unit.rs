@@ -79,9 +79,7 @@ fn relative(times: &[f64], step: f64) -> Result<Told, Trouble> {
         _ => "ms",
     };
     Err((
-        format!(
-            "the times are whole numbers, {step} apart, which are no seconds for a tracker, or slow ones"
-        ),
+        format!("the times are whole numbers that lie {step} apart: seconds, or something smaller"),
         format!("say what they are: --time-unit {smaller}, or --time-unit s"),
     ))
 }
