@@ -30,7 +30,30 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         belief: &Gaussian<N>,
         measurement: &Measurement<M>,
     ) -> Result<Self, FilterError> {
-        let sensor = Aged::new(sensor, measurement.age);
+        if measurement.age == 0.0 {
+            return Comparison::of_present(sensor, belief, measurement);
+        }
+        Comparison::of_past(sensor, belief, measurement)
+    }
+
+    // Out of line, so that the common case stays small.
+    #[cold]
+    #[inline(never)]
+    fn of_past(
+        sensor: &impl Sensor<N, M>,
+        belief: &Gaussian<N>,
+        measurement: &Measurement<M>,
+    ) -> Result<Self, FilterError> {
+        Comparison::of_present(&Aged::new(sensor, measurement.age), belief, measurement)
+    }
+
+    /// Compares with what a sensor reads of the belief as it is.
+    #[inline(always)]
+    fn of_present(
+        sensor: &impl Sensor<N, M>,
+        belief: &Gaussian<N>,
+        measurement: &Measurement<M>,
+    ) -> Result<Self, FilterError> {
         let expected = sensor.expected(&belief.mean);
         let Reading { value, noise } = sensor.read(measurement, Some(&expected))?;
         let residual = sensor.difference(&value, &expected);
@@ -65,9 +88,12 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
     ) -> Result<SMatrix<f64, N, N>, FilterError> {
         // With A = (I - K H) P = P - K (P Hᵀ)ᵀ computed once.
         let shrunk = belief.covariance - gain * self.cross.transpose();
-        let mut covariance = shrunk
-            - (Aged::new(sensor, self.age).project(&shrunk, &self.jacobian) - gain * self.noise)
-                * gain.transpose();
+        // A sensor's shortcut holds for its own Jacobian alone.
+        let projected = match self.age == 0.0 {
+            true => sensor.project(&shrunk, &self.jacobian),
+            false => shrunk * self.jacobian.transpose(),
+        };
+        let mut covariance = shrunk - (projected - gain * self.noise) * gain.transpose();
         positive::symmetrise(&mut covariance);
         if !positive::is_definite(&covariance) {
             covariance = self.factored(belief, gain)?;
