@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector, Vector2};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::correction::{Comparison, near};
+use super::correction::{self, near};
 use super::gaussian::{linear_reach, searched};
 use super::{Filter, Innovation, sampling};
 use crate::association::{Region, Search};
@@ -149,11 +149,10 @@ impl<T, S, const M: usize> Particle<T, S, M> {
         S: Sensor<N, M>,
     {
         let mut state = belief.moments();
-        let comparison = Comparison::new(&self.sensor, &state, measurement)?;
-        comparison.condition(&self.sensor, &mut state)?;
+        let innovation = correction::update(&self.sensor, &mut state, measurement)?;
         belief.resample(self.count, None);
         belief.draw(&state);
-        Ok(comparison.innovation)
+        Ok(innovation)
     }
 
     /// How the measurement compares with each particle: the innovation, after `each` has seen the logarithms of the
@@ -305,7 +304,7 @@ where
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         if self.is_tentative(belief) {
-            return Ok(Comparison::new(&self.sensor, &belief.moments(), measurement)?.innovation);
+            return correction::innovation(&self.sensor, &belief.moments(), measurement);
         }
         self.compare(belief, measurement, |_| ())
     }
