@@ -1,5 +1,7 @@
 //! Measurements that are older than their scan: a radar that turns once in four seconds.
 
+#![allow(clippy::unwrap_used)]
+
 use nalgebra::{SMatrix, SVector, vector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -129,10 +129,11 @@ impl<'a> Reference<'a> {
     }
 
     fn update(&mut self, measurement: &Measurement<2>) {
-        let reading = Sensor::<4, 2>::read(&radar(), measurement, None).unwrap();
+        let read = |place: &Vector2<f64>| Sensor::<4, 2>::read(&radar(), measurement, Some(place)).unwrap();
         let (mut states, mut innovations, mut spreads) = (Vec::new(), Vec::new(), Vec::new());
         for (net, belief) in self.nets.iter().zip(&mut self.beliefs) {
             let Gaussian { mean, covariance } = net.state(belief);
+            let reading = read(&mean.xy());
             innovations.push(reading.value - mean.xy());
             spreads.push(covariance.fixed_view::<2, 2>(0, 0) + reading.noise);
             net.update(belief, measurement).unwrap();
@@ -146,6 +147,8 @@ impl<'a> Reference<'a> {
         if let Some(attention) = self.hyper.attention {
             self.weigh(&attention, &nis, &spreads);
         }
+        let mean: Vector4<f64> = states.iter().map(|state| state / states.len() as f64).sum();
+        let reading = read(&mean.xy());
         let inputs = self.inputs(&states, &innovations, &spreads, &nis, reading.value, reading.noise);
         self.think(&inputs, &states);
         self.waited = 0.0;

@@ -77,9 +77,9 @@ impl Region {
 /// belief.mean[2] = 100.0;
 /// let old = Measurement::from([-200.0, 0.0]).with_age(2.0);
 /// let mut search = Search::new(Gate::default());
-/// let place = filter.place(&old).unwrap();
+/// let place = Filter::<4>::place(&filter, &old).unwrap();
 /// assert!(!filter.reach(&belief, &search).unwrap().contains(&place));
-/// filter.widen(&mut search, &old);
+/// Filter::<4>::widen(&filter, &mut search, &old);
 /// assert!(filter.reach(&belief, &search).unwrap().contains(&place));
 /// # Ok::<(), tercel_core::error::FilterError>(())
 /// ```

@@ -10,8 +10,6 @@ use crate::sensor::{Aged, Measurement, Reading, Sensor};
 
 /// A measurement compared with a Gaussian belief through a linearised sensor.
 pub(crate) struct Comparison<const N: usize, const M: usize> {
-    /// Of the measurement, s.
-    age: f64,
     residual: SVector<f64, M>,
     noise: SMatrix<f64, M, M>,
     jacobian: SMatrix<f64, M, N>,
@@ -22,7 +20,7 @@ pub(crate) struct Comparison<const N: usize, const M: usize> {
 }
 
 impl<const N: usize, const M: usize> Comparison<N, M> {
-    /// Compares `measurement` with what `sensor` would read of `belief`.
+    /// Compares `measurement` with what `sensor` would read of `belief` as it is; for one with an age, that is the sensor of then.
     // Inlined by force, as `condition` is: the parts would otherwise travel through memory, a quarter of the time of a step.
     #[inline(always)]
     pub fn new(
@@ -30,7 +28,6 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         belief: &Gaussian<N>,
         measurement: &Measurement<M>,
     ) -> Result<Self, FilterError> {
-        let sensor = Aged::new(sensor, measurement.age);
         let expected = sensor.expected(&belief.mean);
         let Reading { value, noise } = sensor.read(measurement, Some(&expected))?;
         let residual = sensor.difference(&value, &expected);
@@ -39,7 +36,7 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         let factor = Cholesky::new(&(jacobian * cross + noise), "innovation covariance")?;
         let nis = near(factor.mahalanobis(&residual))?;
         let innovation = Innovation::new(&residual, nis, factor.ln_density(nis));
-        Ok(Comparison { age: measurement.age, residual, noise, jacobian, cross, factor, innovation })
+        Ok(Comparison { residual, noise, jacobian, cross, factor, innovation })
     }
 
     /// Conditions the belief on the measurement, with the covariance in Joseph's form. On an error it stays as it was.
@@ -65,9 +62,8 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
     ) -> Result<SMatrix<f64, N, N>, FilterError> {
         // With A = (I - K H) P = P - K (P Hᵀ)ᵀ computed once.
         let shrunk = belief.covariance - gain * self.cross.transpose();
-        let mut covariance = shrunk
-            - (Aged::new(sensor, self.age).project(&shrunk, &self.jacobian) - gain * self.noise)
-                * gain.transpose();
+        let mut covariance =
+            shrunk - (sensor.project(&shrunk, &self.jacobian) - gain * self.noise) * gain.transpose();
         positive::symmetrise(&mut covariance);
         if !positive::is_definite(&covariance) {
             covariance = self.factored(belief, gain)?;
@@ -89,6 +85,44 @@ impl<const N: usize, const M: usize> Comparison<N, M> {
         positive::settle(&mut covariance, "state covariance")?;
         Ok(covariance)
     }
+}
+
+/// Conditions a belief on a measurement of any age. On an error it stays as it was.
+#[inline(always)]
+pub(crate) fn update<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    belief: &mut Gaussian<N>,
+    measurement: &Measurement<M>,
+) -> Result<Innovation, FilterError> {
+    if measurement.age != 0.0 {
+        return update_of_then(&Aged::new(sensor, measurement.age), belief, measurement);
+    }
+    let comparison = Comparison::new(sensor, belief, measurement)?;
+    comparison.condition(sensor, belief)?;
+    Ok(comparison.innovation)
+}
+
+// Out of line, so that the common case stays small.
+#[cold]
+#[inline(never)]
+fn update_of_then<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    belief: &mut Gaussian<N>,
+    measurement: &Measurement<M>,
+) -> Result<Innovation, FilterError> {
+    let comparison = Comparison::new(sensor, belief, measurement)?;
+    comparison.condition(sensor, belief)?;
+    Ok(comparison.innovation)
+}
+
+/// What [`update`] would return.
+#[inline(always)]
+pub(crate) fn innovation<const N: usize, const M: usize>(
+    sensor: &impl Sensor<N, M>,
+    belief: &Gaussian<N>,
+    measurement: &Measurement<M>,
+) -> Result<Innovation, FilterError> {
+    Ok(Comparison::new(&Aged::new(sensor, measurement.age), belief, measurement)?.innovation)
 }
 
 /// Largest normalised innovation squared. The square of what lies farther away than this may be too large for a double in the
@@ -155,8 +189,9 @@ pub(crate) fn associate<const N: usize, const M: usize>(
     none: f64,
 ) -> Option<f64> {
     let first = parts.first()?.1;
+    let sensor = &Aged::new(sensor, first.age);
     let comparison = Comparison::new(sensor, belief, first).ok()?;
-    let expected = Aged::new(sensor, first.age).expected(&belief.mean);
+    let expected = sensor.expected(&belief.mean);
     // Mean and covariance of the residual; it is zero where no measurement is the object's own.
     let (mut mean, mut scatter) = (SVector::<f64, M>::zeros(), SMatrix::<f64, M, M>::zeros());
     let (mut total, mut weight) = (none, 0.0);

@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 use std::ops::AddAssign;
 
-use nalgebra::{SVector, Vector2};
+use nalgebra::{SMatrix, SVector, Vector2};
 
 use crate::association::{Region, Search};
 use crate::belief::{Gaussian, positive};
@@ -116,7 +116,7 @@ pub(super) fn linear_reach<const N: usize, const M: usize>(
 pub(super) fn moments<const N: usize, G: Borrow<Gaussian<N>>>(
     parts: impl Iterator<Item = (f64, G)> + Clone,
 ) -> Gaussian<N> {
-    let mut merged = Gaussian { mean: SVector::zeros(), covariance: nalgebra::SMatrix::zeros() };
+    let mut merged = Gaussian { mean: SVector::zeros(), covariance: SMatrix::zeros() };
     // Relative to the first mean: positions may be large against what lies between them.
     let Some(start) = parts.clone().next().map(|(_, part)| part.borrow().mean) else { return merged };
     let mut total = 0.0;

@@ -1,6 +1,6 @@
 //! The Kalman filter.
 
-use super::correction::{self, Comparison, predicted};
+use super::correction::{self, predicted};
 use super::gaussian::{gaussian_belief, linear_reach};
 use super::{Filter, Innovation, one_by_one};
 use crate::association::{Region, Search};
@@ -77,9 +77,7 @@ where
         belief: &mut Gaussian<N>,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
-        let comparison = Comparison::new(&self.sensor, belief, measurement)?;
-        comparison.condition(&self.sensor, belief)?;
-        Ok(comparison.innovation)
+        correction::update(&self.sensor, belief, measurement)
     }
 
     #[inline]
@@ -88,7 +86,7 @@ where
         belief: &Gaussian<N>,
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
-        Ok(Comparison::new(&self.sensor, belief, measurement)?.innovation)
+        correction::innovation(&self.sensor, belief, measurement)
     }
 
     fn innovations(

@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector, Vector2};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::correction::{Comparison, near};
+use super::correction::{self, near};
 use super::gaussian::{linear_reach, searched};
 use super::{Filter, Innovation, sampling};
 use crate::association::{Region, Search};
@@ -149,11 +149,10 @@ impl<T, S, const M: usize> Particle<T, S, M> {
         S: Sensor<N, M>,
     {
         let mut state = belief.moments();
-        let comparison = Comparison::new(&self.sensor, &state, measurement)?;
-        comparison.condition(&self.sensor, &mut state)?;
+        let innovation = correction::update(&self.sensor, &mut state, measurement)?;
         belief.resample(self.count, None);
         belief.draw(&state);
-        Ok(comparison.innovation)
+        Ok(innovation)
     }
 
     /// How the measurement compares with each particle: the innovation, after `each` has seen the logarithms of the
@@ -174,13 +173,13 @@ impl<T, S, const M: usize> Particle<T, S, M> {
         // fall apart where the measurement lies opposite.
         let mut origin = None;
         let mut measured = SVector::zeros();
-        let mut noises = Noises::default();
+        let mut noises = Noises::new();
         for ((weight, state), ln_weight) in belief.weighted().zip(&belief.weights) {
             let expected = sensor.expected(state);
             let Reading { value, noise } = sensor.read(measurement, Some(&expected))?;
-            let factor = noises.add(weight, &noise)?;
+            let (factor, ln_peak) = noises.add(weight, &noise)?;
             let residual = sensor.difference(&value, &expected);
-            let ln = ln_weight + factor.ln_density(factor.mahalanobis(&residual));
+            let ln = ln_weight + ln_peak - 0.5 * factor.mahalanobis(&residual);
             if ln.is_nan() || ln == f64::INFINITY {
                 return Err(FilterError::NotFinite { what: "innovation" });
             }
@@ -208,39 +207,32 @@ impl<T, S, const M: usize> Particle<T, S, M> {
 
 /// The noises of one measurement at the places of particles, which are mostly all the same.
 struct Noises<const M: usize> {
-    last: Option<(SMatrix<f64, M, M>, Cholesky<M>)>,
+    /// The first with its density.
+    first: Option<(SMatrix<f64, M, M>, Density<M>)>,
     /// The weighted mean of those added.
     mean: SMatrix<f64, M, M>,
-    first: Option<SMatrix<f64, M, M>>,
 }
 
-impl<const M: usize> Default for Noises<M> {
-    fn default() -> Self {
-        Noises { last: None, mean: SMatrix::zeros(), first: None }
-    }
-}
+/// The factor of a covariance, and the logarithm of its density at zero.
+type Density<const M: usize> = (Cholesky<M>, f64);
 
 impl<const M: usize> Noises<M> {
-    /// Takes in the noise at a particle of this weight; the weights add up to one. Gives its factor.
+    fn new() -> Self {
+        Noises { first: None, mean: SMatrix::zeros() }
+    }
+
+    /// Takes in the noise at a particle of this weight; the weights add up to one.
     #[inline]
-    fn add(&mut self, weight: f64, noise: &SMatrix<f64, M, M>) -> Result<Cholesky<M>, FilterError> {
-        match (&self.last, &self.first) {
-            (Some((last, factor)), Some(first)) if last == noise => {
-                if noise != first {
-                    self.mean += (noise - first) * weight;
-                }
-                Ok(*factor)
-            }
-            (_, first) => {
-                match first {
-                    Some(first) => self.mean += (noise - first) * weight,
-                    None => (self.first, self.mean) = (Some(*noise), *noise),
-                }
-                let factor = Cholesky::new(noise, "noise of the measurement")?;
-                self.last = Some((*noise, factor));
-                Ok(factor)
-            }
+    fn add(&mut self, weight: f64, noise: &SMatrix<f64, M, M>) -> Result<Density<M>, FilterError> {
+        match &self.first {
+            Some((first, density)) if noise == first => return Ok(*density),
+            Some((first, _)) => self.mean += (noise - first) * weight,
+            None => self.mean = *noise,
         }
+        let factor = Cholesky::new(noise, "noise of the measurement")?;
+        let density = (factor, factor.ln_density(0.0));
+        self.first.get_or_insert((*noise, density));
+        Ok(density)
     }
 }
 
@@ -312,7 +304,7 @@ where
         measurement: &Measurement<M>,
     ) -> Result<Innovation, FilterError> {
         if self.is_tentative(belief) {
-            return Ok(Comparison::new(&self.sensor, &belief.moments(), measurement)?.innovation);
+            return correction::innovation(&self.sensor, &belief.moments(), measurement);
         }
         self.compare(belief, measurement, |_| ())
     }

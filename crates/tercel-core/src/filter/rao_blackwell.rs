@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::correction::{Comparison, predicted};
+use super::correction::{self, predicted};
 use super::gaussian::linear_reach;
 use super::innovation::Blend;
 use super::{Estimate, Filter, Innovation, sampling};
@@ -159,17 +159,11 @@ where
     ) -> Result<Innovation, FilterError> {
         let mut blend = Blend::default();
         let mut failure = None;
-        belief.correct(|ln_weight, state| {
-            let corrected = Comparison::new(&self.sensor, state, measurement).and_then(|comparison| {
-                comparison.condition(&self.sensor, state)?;
-                Ok(comparison.innovation)
-            });
-            match corrected {
-                Ok(innovation) => blend.add_weighted(ln_weight.exp(), ln_weight, &innovation),
-                Err(error) => {
-                    failure.get_or_insert(error);
-                    f64::NEG_INFINITY
-                }
+        belief.correct(|ln_weight, state| match correction::update(&self.sensor, state, measurement) {
+            Ok(innovation) => blend.add_weighted(ln_weight.exp(), ln_weight, &innovation),
+            Err(error) => {
+                failure.get_or_insert(error);
+                f64::NEG_INFINITY
             }
         });
         let innovation = blend.finish().ok_or_else(|| nothing_updated(failure))?;
@@ -191,9 +185,9 @@ where
         let mut blend = Blend::default();
         let mut failure = None;
         for (hypothesis, &ln_weight) in belief.particles().iter().zip(belief.ln_weights()) {
-            match Comparison::new(&self.sensor, &hypothesis.state, measurement) {
-                Ok(comparison) => {
-                    blend.add_weighted(ln_weight.exp(), ln_weight, &comparison.innovation);
+            match correction::innovation(&self.sensor, &hypothesis.state, measurement) {
+                Ok(innovation) => {
+                    blend.add_weighted(ln_weight.exp(), ln_weight, &innovation);
                 }
                 Err(error) => {
                     failure.get_or_insert(error);

@@ -69,10 +69,10 @@ impl<const M: usize> Measurement<M> {
     /// When it is not positive definite. An error of zero is not one that a measurement can have.
     #[inline]
     pub fn own_noise(&self) -> Result<Option<&SMatrix<f64, M, M>>, FilterError> {
-        if let Some(noise) = &self.noise {
-            Cholesky::new(noise, "noise of the measurement")?;
+        match &self.noise {
+            Some(noise) => definite(noise).map(|()| Some(noise)),
+            None => Ok(None),
         }
-        Ok(self.noise.as_ref())
     }
 
     /// Fails when the value, the noise or the age holds a number that is not finite.
@@ -83,6 +83,12 @@ impl<const M: usize> Measurement<M> {
         }
         Err(FilterError::NotFinite { what: "measurement" })
     }
+}
+
+// Out of line: most measurements bring no noise.
+#[inline(never)]
+fn definite<const M: usize>(noise: &SMatrix<f64, M, M>) -> Result<(), FilterError> {
+    Cholesky::new(noise, "noise of the measurement").map(drop)
 }
 
 /// A measurement in the components in which a filter compares it with what was expected.

@@ -125,7 +125,7 @@ fn sector(centre: &Vector2<f64>, half: &Vector2<f64>) -> Region {
     let (first, last) = (centre[1] - half[1], centre[1] + half[1]);
     let place = cartesian(centre[0], centre[1]);
     // A range below zero lies opposite.
-    if near < 0.0 || !(half[1] < PI) {
+    if near < 0.0 || half[1] >= PI {
         let reach = Vector2::repeat(far.max(-near));
         return Region { centre: place, low: -reach, high: reach };
     }
