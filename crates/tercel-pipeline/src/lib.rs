@@ -26,6 +26,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod advice;
 pub mod config;
 mod engine;
 mod error;
@@ -37,6 +38,7 @@ mod reorder;
 mod repeats;
 mod sensors;
 
+pub use advice::advice;
 pub use config::Config;
 pub use error::PipelineError;
 pub use pipeline::{Pipeline, Summary};

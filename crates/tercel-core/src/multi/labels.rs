@@ -63,6 +63,7 @@ impl<B: Clone> Roster<B> {
     pub fn hold<'a>(
         &self,
         weights: impl Iterator<Item = (TrackId, &'a mut f64)>,
+        management: &Management,
         (time, survival): (f64, f64),
     ) {
         let mut labels: BTreeMap<TrackId, Vec<&mut f64>> = BTreeMap::new();
@@ -70,7 +71,7 @@ impl<B: Clone> Roster<B> {
         for track in &self.tracks {
             let Some(weights) = labels.get_mut(&track.id) else { continue };
             let sum: f64 = weights.iter().map(|weight| **weight).sum();
-            let least = Management::least(track, time, survival);
+            let least = management.least(track, time, survival);
             if sum > 0.0 && sum < least {
                 weights.iter_mut().for_each(|weight| **weight *= least / sum);
             }

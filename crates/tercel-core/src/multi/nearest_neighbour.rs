@@ -205,7 +205,8 @@ impl<B: Clone> NearestNeighbour<B> {
                 }
                 None if seen > 0.0 => {
                     let missed = r * (1.0 - seen) / (1.0 - r * seen).max(f64::MIN_POSITIVE);
-                    track.existence = missed.max(Management::least(track, scan.time, self.config.survival));
+                    track.existence =
+                        missed.max(self.config.management.least(track, scan.time, self.config.survival));
                     track.miss();
                 }
                 None => track.unseen(),
