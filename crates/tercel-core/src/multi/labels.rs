@@ -100,8 +100,8 @@ impl<B: Clone> Roster<B> {
 
     /// Reads the tracks off terms that are sorted by falling weight. Terms of one label that lie together are one object:
     /// its existence is the sum of their weights, its belief their merger. It was seen when the sum reaches
-    /// `extract`. A tentative track of less weight was not missed as long as it is more likely seen than not, if it is there at
-    /// all. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
+    /// `extract`. A tentative track of less weight was not missed as long as its weight grows and it is more likely seen than not,
+    /// if it is there at all. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
     /// a track is marked; the others count as clutter. A track that is gone is reported where it would be now, after a time `dt`.
     pub fn read<const N: usize, F>(
         &mut self,
@@ -159,10 +159,13 @@ impl<B: Clone> Roster<B> {
         let (track, lead) = (&mut self.tracks[at], &terms[group.lead]);
         track.existence = group.weight.min(1.0);
         track.belief = group.belief(filter, terms);
-        let grows = !track.confirmed && group.detected >= 0.5 * group.weight;
+        let grows = !track.confirmed && group.weight > track.known && group.detected >= 0.5 * group.weight;
         match lead.tag.measurement {
             Some(number) if group.weight >= extract => track.hit(number, time),
-            Some(_) if grows => track.unseen(),
+            Some(_) if grows => {
+                track.known = group.weight;
+                track.unseen();
+            }
             _ if lead.tag.in_view => track.miss(),
             _ => track.unseen(),
         }
