@@ -26,6 +26,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod advice;
 mod antenna;
 mod carrier;
 pub mod config;
@@ -44,6 +45,7 @@ mod slant;
 mod turns;
 mod understood;
 
+pub use advice::advice;
 pub use config::Config;
 pub use error::PipelineError;
 pub use notice::Notice;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use tercel_pipeline::config::presets;
-use tercel_pipeline::{Config, Pipeline};
+use tercel_pipeline::{Config, Pipeline, advice};
 
 use crate::console::Console;
 use crate::failure::{Failure, read_text};
@@ -83,6 +83,8 @@ impl ConfigCommand {
             ConfigCommand::Init(arguments) => arguments.run(console),
             ConfigCommand::Check(arguments) => {
                 let (config, _) = read(&arguments.file)?;
+                let told = advice(&config, None).map_err(|error| Failure::failed(error.to_string()))?;
+                told.iter().for_each(|sentence| console.warn(format_args!("{sentence}")));
                 print(&format!("{}: ok ({})\n", arguments.file.display(), described(&config)))
             }
             ConfigCommand::Schema => print(&format!("{:#}\n", Config::schema())),

@@ -214,7 +214,7 @@ impl<B: Clone> Jpda<B> {
                     }
                 }
                 _ if telling > 0.0 => {
-                    let least = Management::least(track, scan.time, self.config.survival);
+                    let least = self.config.management.least(track, scan.time, self.config.survival);
                     track.existence = track.existence.max(least);
                     track.miss();
                 }

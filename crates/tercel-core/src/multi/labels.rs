@@ -63,6 +63,7 @@ impl<B: Clone> Roster<B> {
     pub fn hold<'a>(
         &self,
         weights: impl Iterator<Item = (TrackId, &'a mut f64)>,
+        management: &Management,
         (time, survival): (f64, f64),
     ) {
         let mut labels: BTreeMap<TrackId, Vec<&mut f64>> = BTreeMap::new();
@@ -70,7 +71,7 @@ impl<B: Clone> Roster<B> {
         for track in &self.tracks {
             let Some(weights) = labels.get_mut(&track.id) else { continue };
             let sum: f64 = weights.iter().map(|weight| **weight).sum();
-            let least = Management::least(track, time, survival);
+            let least = management.least(track, time, survival);
             if sum > 0.0 && sum < least {
                 weights.iter_mut().for_each(|weight| **weight *= least / sum);
             }
@@ -99,8 +100,8 @@ impl<B: Clone> Roster<B> {
 
     /// Reads the tracks off terms that are sorted by falling weight. Terms of one label that lie together are one object:
     /// its existence is the sum of their weights, its belief their merger. It was seen when the sum reaches
-    /// `extract`. A tentative track of less weight was not missed as long as it is more likely seen than not, if it is there at
-    /// all. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
+    /// `extract`. A tentative track of less weight was not missed as long as its weight grows and it is more likely seen than not,
+    /// if it is there at all. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
     /// a track is marked; the others count as clutter. A track that is gone is reported where it would be now, after a time `dt`.
     pub fn read<const N: usize, F>(
         &mut self,
@@ -159,13 +160,16 @@ impl<B: Clone> Roster<B> {
         let (track, lead) = (&mut self.tracks[at], &terms[group.lead]);
         track.existence = group.weight.min(1.0);
         track.belief = group.belief(filter, terms);
-        let grows = !track.confirmed && group.detected >= 0.5 * group.weight;
+        let grows = !track.confirmed && group.weight > track.known && group.detected >= 0.5 * group.weight;
         match lead.tag.measurement {
             Some(number) if group.weight >= extract => {
                 track.hit(number, time);
                 track.reports = !lead.tag.in_view;
             }
-            Some(_) if grows => track.unseen(),
+            Some(_) if grows => {
+                track.known = group.weight;
+                track.unseen();
+            }
             _ if lead.tag.in_view => track.miss(),
             _ => track.unseen(),
         }

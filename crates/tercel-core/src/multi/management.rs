@@ -7,11 +7,12 @@ use super::{Status, Track};
 /// ## Which rule ends which track
 /// | rule | a tentative track | a confirmed track |
 /// |---|---|---|
-/// | `min_existence` | ends below it; under [`Confirmation::Hits`] counting alone ends it | ends below it when a measurement has just updated it: what it takes for the object does not fit |
+/// | `min_existence` | ends below it; under [`Confirmation::Hits`] counting alone ends it | ends below it when a measurement has just updated it, for what it takes does not fit, or when the last one left it less likely to exist than not |
 /// | [`Confirmation::Hits`] | ends when it can no longer reach the number | - |
+/// | `lost_existence`, if it is given | - | ends below it; the rule above does not hold then |
 /// | `max_misses`, `max_coast` | ends beyond them | ends beyond them |
 ///
-/// Misses alone never end a confirmed track before `max_misses` or `max_coast` does. If the probability of detection were
+/// Without `lost_existence`, misses alone never end a confirmed track before `max_misses` or `max_coast` does. If the probability of detection were
 /// constant and known, four misses in a row would leave hardly a doubt that an object is gone; but objects hide behind others
 /// and sensors have bad hours. So one object in a hundred that exists is taken to be hidden, and the existence `r` of a
 /// confirmed track at its last update, with survival `s` since, sinks no lower than
@@ -32,6 +33,9 @@ pub struct Management {
     pub confirm: Confirmation,
     /// The least probability of existence, 0 to 1: see the table above. No track starts with less, and none is confirmed.
     pub min_existence: f64,
+    /// A confirmed track of less existence is deleted, 0 to 1: however it came to that, by misses as well. So the probability of
+    /// detection is believed, which ends tracks sooner where it is high and false tracks are many. `None` leaves it to the misses.
+    pub lost_existence: Option<f64>,
     /// A track with more misses in a row is deleted. Only scans that should have seen the track count.
     pub max_misses: u32,
     /// A track that was not updated for longer is deleted, s, even if no sensor could have seen it. `None` stands for 15 s, or
@@ -68,6 +72,7 @@ impl Default for Management {
         Management {
             confirm: Confirmation::Existence(0.95),
             min_existence: 0.02,
+            lost_existence: None,
             max_misses: 5,
             max_coast: None,
         }
@@ -78,10 +83,10 @@ impl Default for Management {
 const PATIENCE: f64 = 4.0;
 
 impl Management {
-    /// The least existence of a track that coasts, at `time`: objects survive a second with the probability `survival`. Zero for
-    /// a track that is not confirmed.
-    pub(super) fn least<B>(track: &Track<B>, time: f64, survival: f64) -> f64 {
-        if !track.confirmed {
+    /// The least existence of a track that coasts, at `time`: objects survive a second with the probability `survival`. Zero where
+    /// existence is to say when a track ends.
+    pub(super) fn least<B>(&self, track: &Track<B>, time: f64, survival: f64) -> f64 {
+        if self.lost_existence.is_some() || is_doubted(track) {
             return 0.0;
         }
         let alive = track.known * survival.powf(time - track.updated);
@@ -89,18 +94,23 @@ impl Management {
         hidden / (hidden + 1.0 - alive)
     }
 
-    /// Whether existence alone can end a track that was missed.
-    pub(super) fn ends_by_existence(&self, confirmed: bool) -> bool {
-        !confirmed && matches!(self.confirm, Confirmation::Existence(_))
+    /// The existence below which a track ends that a measurement has just updated, or not.
+    pub(super) fn limit<B>(&self, track: &Track<B>, seen: bool) -> f64 {
+        let counts = matches!(self.confirm, Confirmation::Hits { .. });
+        match self.lost_existence {
+            Some(lost) if track.confirmed => lost,
+            Some(_) | None if track.confirmed && seen => self.min_existence,
+            Some(_) | None if counts || !is_doubted(track) => 0.0,
+            Some(_) | None => self.min_existence,
+        }
     }
 
     /// Sets the status of a track whose bookkeeping for the scan at `time` is done.
     pub(super) fn judge<B>(&self, track: &mut Track<B>, time: f64) {
-        let doubtful = track.existence < self.min_existence;
         let seen = track.measurement.is_some();
         let give_up = track.misses > self.max_misses
             || self.is_overdue(track, time)
-            || doubtful && (self.ends_by_existence(track.confirmed) || track.confirmed && seen)
+            || track.existence < self.limit(track, seen)
             || track.existence.is_nan()
             || track.existence <= 0.0;
         track.status = match self.confirm {
@@ -108,7 +118,7 @@ impl Management {
             _ if track.confirmed => Status::Confirmed,
             Confirmation::Existence(threshold) if track.existence >= threshold => Status::Confirmed,
             Confirmation::Existence(_) => Status::Tentative,
-            Confirmation::Hits { hits, scans } => Self::judge_hits(track, hits, scans, doubtful),
+            Confirmation::Hits { hits, scans } => self.judge_hits(track, hits, scans),
         };
         track.confirmed |= track.status == Status::Confirmed;
         if seen {
@@ -136,7 +146,8 @@ impl Management {
         time - track.updated > self.coast(track)
     }
 
-    fn judge_hits<B>(track: &Track<B>, hits: u32, scans: u32, doubtful: bool) -> Status {
+    fn judge_hits<B>(&self, track: &Track<B>, hits: u32, scans: u32) -> Status {
+        let doubtful = track.existence < self.min_existence;
         let window = scans.clamp(1, 64);
         let recent = (track.history & (u64::MAX >> (64 - window))).count_ones();
         let left = window.saturating_sub(track.seen);
@@ -146,6 +157,11 @@ impl Management {
             () => Status::Tentative,
         }
     }
+}
+
+/// A track that is not confirmed, or whose last update left it less likely to exist than not.
+fn is_doubted<B>(track: &Track<B>) -> bool {
+    !track.confirmed || track.known < 0.5
 }
 
 #[cfg(test)]

@@ -259,7 +259,7 @@ impl<B: Clone> MultiBernoulli<B> {
             self.objects.push(Bernoulli { existence, label, beliefs: pool.beliefs });
         }
         let weights = self.objects.iter_mut().map(|object| (object.label.id, &mut object.existence));
-        self.roster.hold(weights, (time, self.config.survival));
+        self.roster.hold(weights, &self.config.management, (time, self.config.survival));
         let (prune, merge, cap) = (self.config.prune, self.config.merge, self.config.beliefs);
         self.objects.retain(|object| object.existence > prune && !object.beliefs.is_empty());
         for object in &mut self.objects {

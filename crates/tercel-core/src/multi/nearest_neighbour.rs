@@ -21,10 +21,10 @@ use super::{Management, Scan, Track, Tracker, TrackerError, Use, error, ln_clutt
 /// paired    r = r⁻ l / (1 - r⁻ + r⁻ l),        l = 1 - p_D + p_D q(z) / κ(z), and the belief is updated by z
 /// missed    r = r⁻ (1 - p_D) / (1 - r⁻ p_D)
 /// ```
-/// A track that stays alone is assigned once more, among what nothing explains and as if it existed for sure: the costs are then
-/// `-ln(p_D q(z) / κ(z))` and `-ln(1 - p_D)`. A track of one measurement is often less likely than clutter, at whatever it is
-/// seen next; its existence says so and rises or sinks with each scan, but it is followed. (Existence cannot be talked up by
-/// this: the expectation of `l` over clutter is at most one.) A measurement that no track takes starts a tentative one. A track whose belief has come as close to that of a stronger
+/// In dense clutter, or after a long time, a track of one measurement is less likely than clutter wherever it is seen next. Such a
+/// track is assigned once more, among what nothing explains and as if it existed for sure: the costs are then
+/// `-ln(p_D q(z) / κ(z))` and `-ln(1 - p_D)`. Its existence says how doubtful it is, and rises or sinks with each scan. (It cannot
+/// be talked up by this: the expectation of `l` over clutter is at most one.) A measurement that no track takes starts a tentative one. A track whose belief has come as close to that of a stronger
 /// one as if both were one object is dropped.
 ///
 /// ## Use it when
@@ -104,6 +104,8 @@ struct Scratch {
     misses: Vec<f64>,
     /// How each track is seen.
     sights: Vec<Sight>,
+    /// Tracks so doubtful that no measurement, wherever it lies, is more likely theirs than clutter.
+    hopeless: Vec<bool>,
     columns: Vec<Option<usize>>,
 }
 
@@ -130,14 +132,16 @@ impl<B: Clone> NearestNeighbour<B> {
     where
         F: Filter<N, Belief = B> + ?Sized,
     {
-        let Scratch { vicinity, solver, pairs, misses, sights, columns } = &mut self.scratch;
+        let Scratch { vicinity, solver, pairs, misses, sights, hopeless, columns } = &mut self.scratch;
         pairs.clear();
         misses.clear();
         sights.clear();
+        hopeless.clear();
         for (row, track) in self.objects.active().enumerate() {
             let (sight, near) = vicinity.look(filter, &track.belief, scan);
             sights.push(sight);
-            misses.push(-(1.0 - track.existence * sight.missed).max(f64::MIN_POSITIVE).ln());
+            let miss = -(1.0 - track.existence * sight.missed).max(f64::MIN_POSITIVE).ln();
+            let mut least = f64::INFINITY;
             for &column in near {
                 // A pair that cannot be compared numerically is a pair outside the gate.
                 let Ok(innovation) = filter.innovation(&track.belief, &scan.measurements[column]) else {
@@ -147,8 +151,11 @@ impl<B: Clone> NearestNeighbour<B> {
                 let cost = -(track.existence * sight.seen).ln() - innovation.log_likelihood + clutter;
                 if self.config.gate.contains(&innovation) && cost.is_finite() {
                     pairs.push((row, column, cost));
+                    least = least.min(cost - 0.5 * innovation.nis);
                 }
             }
+            misses.push(miss);
+            hopeless.push(least >= miss);
         }
         columns.clear();
         match solver.solve_sparse(pairs, scan.measurements.len(), misses) {
@@ -158,15 +165,14 @@ impl<B: Clone> NearestNeighbour<B> {
         }
     }
 
-    /// Lets tracks that the most likely explanation of the scan leaves alone go on with what it leaves unexplained: each takes what
-    /// it most likely is *if it exists*. A doubtful track would else never be more likely than clutter, seen or not, and no
-    /// evidence for it could ever add up.
+    /// Lets the tracks that can never be more likely than clutter go on with what the most likely explanation of the scan leaves
+    /// over: each takes what it most likely is *if it exists*. Else no evidence for it could ever add up.
     fn continue_doubtful(&mut self, measurements: usize) {
-        let Scratch { solver, pairs, misses, sights, columns, .. } = &mut self.scratch;
+        let Scratch { solver, pairs, misses, sights, hopeless, columns, .. } = &mut self.scratch;
         let mut free = vec![true; measurements];
         columns.iter().flatten().for_each(|&column| free[column] = false);
         let Individuals { tracks, active, .. } = &self.objects;
-        pairs.retain(|&(row, column, _)| columns[row].is_none() && free[column]);
+        pairs.retain(|&(row, column, _)| hopeless[row] && free[column]);
         if pairs.is_empty() {
             return;
         }
@@ -208,7 +214,8 @@ impl<B: Clone> NearestNeighbour<B> {
                 }
                 None if missed > 0.0 => {
                     let unseen = r * (1.0 - missed) / (1.0 - r * missed).max(f64::MIN_POSITIVE);
-                    track.existence = unseen.max(Management::least(track, scan.time, self.config.survival));
+                    track.existence =
+                        unseen.max(self.config.management.least(track, scan.time, self.config.survival));
                     track.miss();
                 }
                 None => track.unseen(),

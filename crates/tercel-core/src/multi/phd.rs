@@ -204,7 +204,7 @@ impl<B: Clone> Phd<B> {
         }
         self.terms.append(children);
         let weights = self.terms.iter_mut().map(|term| (term.tag.id, &mut term.weight));
-        self.roster.hold(weights, (scan.time, self.config.survival));
+        self.roster.hold(weights, &self.config.management, (scan.time, self.config.survival));
         self.terms.retain(|term| term.weight > self.config.prune);
     }
 

@@ -198,9 +198,8 @@ impl<B: Clone> Pmbm<B> {
         for tree in self.clusters.iter_mut().flat_map(|cluster| &mut cluster.trees) {
             let Ok(at) = self.tracks.binary_search_by_key(&tree.label, |track| track.id) else { continue };
             let track = &self.tracks[at];
-            tree.missed = Management::least(track, time, *survival);
-            let ends = management.ends_by_existence(track.confirmed);
-            tree.least = if ends { management.min_existence } else { 0.0 };
+            tree.missed = management.least(track, time, *survival);
+            tree.least = management.limit(track, false);
         }
     }
 

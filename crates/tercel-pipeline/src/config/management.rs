@@ -13,6 +13,9 @@ pub struct ManagementConfig {
     pub confirm: ConfirmConfig,
     /// The least probability of existence.
     pub min_existence: Probability,
+    /// The least existence of a confirmed track; without it, misses alone do not end one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_existence: Option<Probability>,
     /// Most misses in a row.
     pub max_misses: u32,
     /// Longest time without an update, s; without it, 15 s or the time of `max_misses` and one more scan, if that is longer.
@@ -32,6 +35,10 @@ pub(super) struct ManagementKeys {
     /// no track is confirmed with less.
     #[schemars(extend("x-unit" = "1"))]
     min_existence: Option<Probability>,
+    /// A confirmed track that exists less probably is given up, by misses as well. Without it, `max_misses` and `max_coast` alone say
+    /// how long a confirmed track may be missed.
+    #[schemars(extend("x-unit" = "1"))]
+    lost_existence: Option<Probability>,
     /// A track with more misses in a row is given up; only scans that should have seen it count. 0 or more.
     #[schemars(extend("x-unit" = "1", "minimum" = 0))]
     max_misses: Option<u32>,
@@ -52,6 +59,7 @@ pub(super) fn over<'de, T: Managed, D: Deserializer<'de>>(source: D) -> Result<M
     Ok(ManagementConfig {
         confirm: given.confirm.unwrap_or(default.confirm),
         min_existence: given.min_existence.unwrap_or(default.min_existence),
+        lost_existence: given.lost_existence.or(default.lost_existence),
         max_misses: given.max_misses.unwrap_or(default.max_misses),
         max_coast: given.max_coast.or(default.max_coast),
     })
@@ -93,6 +101,7 @@ impl ManagementConfig {
                 }),
             },
             min_existence: Probability::constant(library.min_existence),
+            lost_existence: library.lost_existence.map(Probability::constant),
             max_misses: library.max_misses,
             max_coast: library.max_coast.map(Positive::constant),
         }
@@ -107,6 +116,7 @@ impl ManagementConfig {
                 }
             },
             min_existence: self.min_existence.get(),
+            lost_existence: self.lost_existence.map(Probability::get),
             max_misses: self.max_misses,
             max_coast: self.max_coast.map(Positive::get),
         }

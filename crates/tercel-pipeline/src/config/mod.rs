@@ -2,6 +2,7 @@
 //!
 //! Every key has a default except the motion and the sensors; `schema` prints them all with units and ranges.
 
+mod check;
 mod filter;
 mod management;
 mod motion;
@@ -149,6 +150,7 @@ impl Config {
         for (name, sensor) in &self.sensors {
             sensor.check(&format!("sensors.{name}"), self)?;
         }
+        self.check_effects()?;
         self.filter.check(&self.motion, &self.sensors)
     }
 }

@@ -175,6 +175,23 @@ impl MotionConfig {
         }
     }
 
+    /// Standard deviation of a new object's velocity, m/s per axis: the largest of its modes. `None` where there is no velocity, or
+    /// where a model brings its own.
+    pub(crate) fn speed(&self) -> Option<f64> {
+        match self {
+            MotionConfig::RandomWalk { .. } => None,
+            MotionConfig::ConstantVelocity(model) => Some(model.speed.get()),
+            MotionConfig::ConstantAcceleration { speed, .. }
+            | MotionConfig::CoordinatedTurn { speed, .. } => Some(speed.get()),
+            MotionConfig::Singer(model) => Some(model.speed.get()),
+            MotionConfig::Turn(model) => Some(model.speed.get()),
+            MotionConfig::Learned(model) => model.speed.map(Positive::get),
+            MotionConfig::Switching(switching) => {
+                switching.modes.iter().filter_map(MotionConfig::speed).reduce(f64::max)
+            }
+        }
+    }
+
     /// Whether a Kalman filter is exact for it.
     pub(crate) fn is_linear(&self) -> bool {
         match self {

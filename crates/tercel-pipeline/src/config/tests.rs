@@ -109,6 +109,65 @@ fn numbers(schema: &Value, root: &Value, path: &str, found: &mut Vec<(String, Va
 }
 
 #[test]
+fn every_default_is_that_of_the_library() {
+    use tercel_core::multi;
+    assert_eq!(NearestNeighbourConfig::default().build().unwrap(), multi::NearestNeighbourConfig::default());
+    assert_eq!(JpdaConfig::default().build().unwrap(), multi::JpdaConfig::default());
+    assert_eq!(PhdConfig::default().build().unwrap(), multi::PhdConfig::default());
+    assert_eq!(MultiBernoulliConfig::default().build().unwrap(), multi::MultiBernoulliConfig::default());
+    assert_eq!(PmbmConfig::default().build().unwrap(), multi::PmbmConfig::default());
+}
+
+#[test]
+fn a_table_that_is_not_complete_is_filled_from_its_own_tracker() {
+    for tracker in ["nearest_neighbour", "jpda", "phd", "multi_bernoulli", "pmbm"] {
+        let whole = Config::parse(&format!("{SMALL}[tracker.{tracker}]\n")).unwrap();
+        let mut part =
+            Config::parse(&format!("{SMALL}[tracker.{tracker}.management]\nmax_misses = 77\n")).unwrap();
+        assert_eq!(part.tracker.management().max_misses, 77);
+        let misses = whole.tracker.management().max_misses;
+        let text = part.to_toml().replace("max_misses = 77", &format!("max_misses = {misses}"));
+        part = Config::parse(&text).unwrap();
+        assert_eq!(part, whole, "{tracker}");
+    }
+}
+
+#[test]
+fn the_schema_tells_the_default_of_each_tracker() {
+    let schema = Config::schema();
+    let default = |tracker: &str, key: &str| {
+        schema
+            .pointer(&format!("/$defs/{tracker}/properties/management/default/{key}"))
+            .cloned()
+            .unwrap_or_default()
+    };
+    assert_eq!(default("PmbmConfig", "min_existence"), 1e-4);
+    assert_eq!(default("PhdConfig", "max_misses"), 2);
+    assert_eq!(default("PhdConfig", "confirm/hits/scans"), 4);
+    assert_eq!(default("JpdaConfig", "confirm/existence"), 0.95);
+}
+
+#[test]
+fn keys_without_an_effect_are_refused() {
+    let cases = [
+        ("[input]\ndelay = 2.0", "input.delay"),
+        ("[filter]\nseed = 3", "filter.seed"),
+        ("[filter]\nparticles = 300", "filter.particles"),
+        ("[tracker.jpda]\nbirth = 0.01", "tracker.jpda.management.min_existence"),
+        ("[tracker.multi_bernoulli]\nprune = 0.1", "tracker.multi_bernoulli.prune"),
+        ("[tracker.phd.management]\nconfirm = { hits = { hits = 4, scans = 3 } }", "confirm.hits"),
+        ("[tracker.phd.management]\nconfirm = { hits = { hits = 4, scans = 70 } }", "confirm.hits"),
+    ];
+    for (text, key) in cases {
+        let message = refusal(&format!("{SMALL}{text}\n"));
+        assert!(message.contains(key), "{text}: {message}");
+    }
+    let bearing = "{ bearing = { deviation = 0.01, start_range_deviation = 5.0 } }";
+    let message = refusal(&SMALL.replace("{ position = { deviation = 5.0 } }", bearing));
+    assert!(message.contains("start_range_deviation") && message.contains("needs start_range"), "{message}");
+}
+
+#[test]
 fn every_number_has_a_unit_a_range_and_a_sentence() {
     let schema = Config::schema();
     let mut found = Vec::new();

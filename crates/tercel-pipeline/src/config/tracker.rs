@@ -25,6 +25,30 @@ pub enum TrackerConfig {
     Pmbm(PmbmConfig),
 }
 
+impl TrackerConfig {
+    /// Name of the tracker, as in the file.
+    pub fn name(&self) -> &'static str {
+        match self {
+            TrackerConfig::NearestNeighbour(_) => "nearest_neighbour",
+            TrackerConfig::Phd(_) => "phd",
+            TrackerConfig::MultiBernoulli(_) => "multi_bernoulli",
+            TrackerConfig::Jpda(_) => "jpda",
+            TrackerConfig::Pmbm(_) => "pmbm",
+        }
+    }
+
+    /// When its tracks are confirmed and given up.
+    pub fn management(&self) -> &ManagementConfig {
+        match self {
+            TrackerConfig::NearestNeighbour(settings) => &settings.management,
+            TrackerConfig::Phd(settings) => &settings.management,
+            TrackerConfig::MultiBernoulli(settings) => &settings.management,
+            TrackerConfig::Jpda(settings) => &settings.management,
+            TrackerConfig::Pmbm(settings) => &settings.management,
+        }
+    }
+}
+
 impl Default for TrackerConfig {
     fn default() -> Self {
         TrackerConfig::NearestNeighbour(NearestNeighbourConfig::default())

@@ -17,6 +17,7 @@ fn three_hits() -> Management {
     Management {
         confirm: Confirmation::Hits { hits: 3, scans: 8 },
         min_existence: 1e-6,
+        lost_existence: Some(1e-6),
         max_misses: 2,
         ..Management::default()
     }
@@ -54,6 +55,7 @@ pub(crate) fn jpda<B>(_: &Recording) -> Result<Jpda<B>, FilterError> {
         management: Management {
             confirm: Confirmation::Existence(0.9),
             min_existence: 1e-3,
+            lost_existence: Some(1e-3),
             max_misses: 5,
             ..Management::default()
         },
@@ -83,6 +85,7 @@ pub(crate) fn pmbm<B>(recording: &Recording) -> Result<Pmbm<B>, FilterError> {
         management: Management {
             confirm: Confirmation::Existence(0.5),
             min_existence: 1e-4,
+            lost_existence: Some(1e-4),
             ..Management::default()
         },
         ..PmbmConfig::default()
