@@ -135,6 +135,10 @@ fn starts_within(config: &Config, interval: f64) -> Result<Option<bool>, Pipelin
             }
         }
     }
+    // Plots of an antenna that turns are tracked when its turn is over.
+    if pipeline.finish()?.iter().any(|row| row.status == Status::Confirmed) {
+        return Ok(Some(true));
+    }
     let can_place = |measures: &Measures| match measures {
         Measures::Position(_) | Measures::Polar(_) => true,
         Measures::Bearing(bearing) => bearing.start_range.is_some(),
@@ -147,10 +151,15 @@ fn observation(measures: &Measures, from: [f64; 2], place: [f64; 2]) -> Observat
     let [dx, dy] = [place[0] - from[0], place[1] - from[1]];
     match measures {
         Measures::Position(_) => Observation::Position { x: place[0], y: place[1], z: None },
-        Measures::Polar(_) => {
-            Observation::Polar { range: Some(dx.hypot(dy)), bearing: dy.atan2(dx), range_rate: Some(0.0) }
+        Measures::Polar(_) => Observation::Polar {
+            range: Some(dx.hypot(dy)),
+            bearing: dy.atan2(dx),
+            range_rate: Some(0.0),
+            z: None,
+        },
+        Measures::Bearing(_) => {
+            Observation::Polar { range: None, bearing: dy.atan2(dx), range_rate: None, z: None }
         }
-        Measures::Bearing(_) => Observation::Polar { range: None, bearing: dy.atan2(dx), range_rate: None },
     }
 }
 
@@ -160,8 +169,8 @@ fn distance(config: &Config) -> f64 {
         (Measures::Bearing(bearing), _) if bearing.start_range.is_some() => {
             bearing.start_range.map(|range| range.get())
         }
-        (_, DetectionConfig::ByRange(table)) => table.first().map(|entry| 0.5 * entry.0.get()),
-        (_, DetectionConfig::Uniform(_)) => None,
+        (_, Some(DetectionConfig::ByRange(table))) => table.first().map(|entry| 0.5 * entry.0.get()),
+        (_, Some(DetectionConfig::Uniform(_)) | None) => None,
     });
     wanted.fold(DISTANCE, f64::min)
 }
