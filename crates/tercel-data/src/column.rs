@@ -172,7 +172,8 @@ impl Limits {
         let refusal = Refusal::new(value, self.expected());
         Err(match self {
             Limits::Angle if (-720.0..=720.0).contains(&value) && value.abs() > 2.0 * PI => {
-                refusal.helped("the file looks like degrees: pass --angles degrees, with --bearings compass if they run clockwise from north")
+                refusal.helped("the file looks like degrees: pass --angles degrees, with --bearings compass if they run clockwise \
+                 from north")
             }
             Limits::Angle if value.is_finite() => {
                 refusal.helped("bearings run from -pi to pi: subtract 2 pi from the larger ones")

@@ -47,7 +47,8 @@ pub(crate) fn on_earth(latitude: f64, longitude: f64) -> Result<(f64, f64), (&'s
     if latitude.abs() > FRAC_PI_2 + SLACK {
         let refusal = Refusal::new(latitude.to_degrees(), "degrees in [-90, 90]");
         return Err(("latitude", match longitude.abs() <= FRAC_PI_2 {
-            true => refusal.helped("latitude and longitude may be swapped: --column latitude=NAME --column longitude=NAME says which is which"),
+            true => refusal.helped("latitude and longitude may be swapped: --column latitude=NAME --column longitude=NAME says \
+                 which is which"),
             false => refusal,
         }));
     }

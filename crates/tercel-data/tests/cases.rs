@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use tercel_data::table::Observation;
 use tercel_data::{
     Angles, Bearings, DateOrder, Format, ImportOptions, Imported, OnError, ReadOptions, Source, Unit, import,
-    import_table_from, read_detections_from,
+    import_table_from, read_detections_from, write_detections_to,
 };
 
 fn path(name: &str) -> PathBuf {
@@ -73,6 +73,7 @@ fn every_dialect_says_the_same() {
         "  time   sensor  x     y\n   0.5    radar  1.5  -2\n   1.5    radar  3     4.25\n",
         "# made by hand\n# time sensor x y\n0.5 radar 1.5 -2\n1.5 radar 3 4.25\n",
         "\"time\",\"sensor\",\"x\",\"y\"\n\"0.5\",\"radar\",\"1.5\",\"-2\"\n\"1.5\",\"radar\",\"3\",\"4.25\"\n",
+        "time,sensor,x,y\r0.5,radar,1.5,-2\r1.5,radar,3,4.25\r",
         "time,sensor,x,y,\n0.5,radar,1.5,-2,\n1.5,radar,3,4.25,\n",
     ] {
         assert_eq!(read(text), plain, "{text}");
@@ -157,6 +158,7 @@ fn a_row_without_measurement_says_nothing_and_is_told() {
 #[test]
 fn other_names_of_the_columns_are_known() {
     let imported = read_with("xy_timestamp_column.csv", ReadOptions::default());
+    noted(&imported, "no column names the sensor");
     assert_eq!(sizes(&imported), [2; 20]);
 }
 
@@ -282,7 +284,8 @@ fn columns_go_by_the_names_that_are_said() {
 #[test]
 fn identities_are_known_and_doubtful_ones_are_told() {
     let identity = |header: &str| {
-        let imported = csv(&format!("time,x,y,{header}\n0,1,2,219000101\n"), &ReadOptions::default());
+        let options = ReadOptions { sensor: Some("radar".into()), ..ReadOptions::default() };
+        let imported = csv(&format!("time,x,y,{header}\n0,1,2,219000101\n"), &options);
         (imported.detections.scans[0].detections[0].identity.clone(), imported.notes)
     };
     for name in ["identity", "hex", "ICAO24", "Mode S"] {
@@ -420,4 +423,31 @@ fn a_file_with_two_kinds_of_position_uses_the_local_one_and_says_so() {
     let ignore = vec!["x".to_owned(), "y".to_owned()];
     let imported = csv("time,x,y,lat,lon\n0,1,2,47,8\n", &ReadOptions { ignore, ..ReadOptions::default() });
     assert!(imported.detections.origin.is_some());
+}
+
+#[test]
+fn what_was_read_is_written_and_read_back_the_same() {
+    let options = ReadOptions::default();
+    for text in [
+        "time,scan,x,y\n1,0,,\n0,0,1,2\n2,0,,\n0.5,0,3,4\n3,1,1,2\n",
+        "time,sensor,lat,lon\n0,a,47,8\n1,b,47.1,8.1\n0,b,47.1,8\n",
+        "time,range (km),azimuth [deg]\n3,1,10\n1,2,350\n1,2,350\n",
+    ] {
+        let table = csv(text, &options).detections;
+        for format in [Format::Csv, Format::Ndjson, Format::Parquet] {
+            let mut bytes = Vec::new();
+            write_detections_to(&mut bytes, format, "a", &table).unwrap();
+            assert_eq!(
+                read_detections_from(bytes.as_slice(), format, "a", &options).unwrap(),
+                table,
+                "{text}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_web_page_is_no_table() {
+    let error = refused("<!DOCTYPE html><html><body>404</body></html>", &ReadOptions::default());
+    assert!(error.contains("a web page"), "{error}");
 }

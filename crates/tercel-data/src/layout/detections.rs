@@ -111,10 +111,17 @@ impl Layout for Detections {
                 Err(error) => remarks.refuse(error)?,
             }
         }
+        let nameless = (0..sheet.len()).all(|row| sheet.texts("sensor").get(row).is_none());
+        if nameless && !rows.is_empty() && context.options.sensor.is_none() {
+            let note =
+                "no column names the sensor, which is called `sensor`; --sensor NAME calls it otherwise";
+            remarks.notes.push(note.to_owned());
+        }
         let empty = rows.iter().filter(|(row, _)| row.detection.is_none()).count();
         if empty > 0 && !context.ours {
             remarks.notes.push(format!(
-                "{empty} of {} rows have no measurement (empty or nan); a scan of such rows alone is one in which nothing was seen",
+                "{empty} of {} rows have no measurement (empty or nan); \
+                 a scan of such rows alone is one in which nothing was seen",
                 rows.len()
             ));
         }

@@ -40,7 +40,12 @@ impl DetectionRow {
         let problem = if self.position.is_some() && self.position != scan.position {
             "the sensor is at another place than in the row before, in the same scan".to_owned()
         } else {
-            if self.time > scan.time {
+            // A row without a detection says nothing of the time at which the others were made.
+            if scan.detections.is_empty() {
+                scan.time = if self.detection.is_some() { self.time } else { scan.time.max(self.time) };
+            } else if self.detection.is_none() {
+                return Ok(());
+            } else if self.time > scan.time {
                 for detection in &mut scan.detections {
                     detection.time.get_or_insert(scan.time);
                 }

@@ -48,6 +48,7 @@ pub(super) fn scans(
             scan
         }));
     }
+    scans.sort_by(|one, next| one.time.total_cmp(&next.time));
     if repeated > 0 && options.drop_repeated {
         remarks.leave_out("a repeated row".to_owned(), repeated);
     } else if repeated > 0 {

@@ -220,7 +220,8 @@ impl Naming {
         let degrees = unit == Some(Unit::Degree);
         if self.options.bearings.is_none() && compass {
             meaning.note = Some(format!(
-                "`{name}` is read as a compass bearing, clockwise from north; --bearings math if it runs from east towards north"
+                "`{name}` is read as a compass bearing, clockwise from north; \
+                 --bearings math if it runs from east towards north"
             ));
         } else if self.options.bearings.is_none() && (degrees || word == "theta") {
             meaning.note = Some(format!(
@@ -311,7 +312,8 @@ impl Naming {
 pub(crate) const GEOGRAPHIC: [&str; 2] = ["latitude", "longitude"];
 
 /// What is said when a file has positions of both kinds.
-pub(crate) const BOTH_PLACES: &str = "latitude and longitude are not used, since the file has a local position or a bearing as well; --ignore NAME passes over those";
+pub(crate) const BOTH_PLACES: &str = "latitude and longitude are not used, since the file has a local position or a \
+     bearing as well; --ignore NAME passes over those";
 
 /// The unit in which a column comes when nothing says otherwise, where that is not the SI unit.
 fn usual_unit(word: &str, column: &str, angles: Angles) -> Option<Unit> {

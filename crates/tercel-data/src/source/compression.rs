@@ -10,6 +10,10 @@ use super::{read_error, zip};
 use crate::error::DataError;
 
 const BUFFER: usize = 1 << 16;
+/// As much as is looked at to tell what a stream is.
+const BEGINNING: usize = 8192;
+/// As much as says whether a stream is compressed.
+const MAGIC: usize = 6;
 
 /// A stream that is decompressed if it begins like a compressed one.
 pub(crate) fn decompressed<'a>(
@@ -58,7 +62,7 @@ impl Compression {
 ///
 /// A pipe may hand out a single byte first, so that looking into the buffer of a reader is not enough.
 struct Rejoined<R> {
-    start: [u8; 6],
+    start: Box<[u8; BEGINNING]>,
     filled: usize,
     taken: usize,
     rest: R,
@@ -66,13 +70,13 @@ struct Rejoined<R> {
 
 impl<R: Read> Rejoined<R> {
     fn new(rest: R) -> Self {
-        Rejoined { start: [0; 6], filled: 0, taken: 0, rest }
+        Rejoined { start: Box::new([0; BEGINNING]), filled: 0, taken: 0, rest }
     }
 
     /// Reads on while the stream may still turn out to be compressed; a line of text is not waited for in vain.
     fn peek(&mut self) -> io::Result<&[u8]> {
         const BEGINNINGS: [u8; 4] = [0x1f, 0x28, 0xfd, b'P'];
-        while self.filled < self.start.len() {
+        while self.filled < MAGIC {
             match self.rest.read(&mut self.start[self.filled..]) {
                 Ok(0) => break,
                 Ok(more) => self.filled += more,

@@ -50,7 +50,8 @@ pub(super) fn of_column(times: &[f64]) -> Result<Told, Trouble> {
 fn days(step: f64, middle: f64) -> Result<Told, Trouble> {
     const SURE: f64 = 5e-4;
     if step < SURE {
-        let note = "the times are days, as spreadsheets count them, and were converted to seconds; --time-unit s says otherwise";
+        let note = "the times are days, as spreadsheets count them, and were converted to seconds; \
+                    --time-unit s says otherwise";
         return Ok((Unit::Day, Some(note.to_owned())));
     }
     Err((
@@ -78,9 +79,7 @@ fn relative(times: &[f64], step: f64) -> Result<Told, Trouble> {
         _ => "ms",
     };
     Err((
-        format!(
-            "the times are whole numbers, {step} apart, which are no seconds for a tracker, or slow ones"
-        ),
+        format!("the times are whole numbers that lie {step} apart: seconds, or something smaller"),
         format!("say what they are: --time-unit {smaller}, or --time-unit s"),
     ))
 }

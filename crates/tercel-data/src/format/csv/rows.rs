@@ -22,6 +22,8 @@ pub(crate) struct Rows<'a> {
     /// The JSON of the line that describes a table of ours.
     pub described: Option<String>,
     text: Text<'a>,
+    /// The last byte of a line.
+    end: u8,
     delimiter: Delimiter,
     /// Lines that were read ahead.
     ahead: VecDeque<String>,
@@ -48,7 +50,10 @@ impl<'a> Rows<'a> {
             let help = "name the format: --from ndjson";
             return Err(DataError::unsettled(Place::whole(file), "this is JSON, not a table of cells", help));
         }
+        // Old programs end lines by a carriage return alone.
+        let end = if start.contains(&b'\r') && !start.contains(&b'\n') { b'\r' } else { b'\n' };
         let mut rows = Rows {
+            end,
             header: Vec::new(),
             described: None,
             text: text(reader, file)?,
@@ -326,8 +331,10 @@ impl<'a> Rows<'a> {
 
     /// Reads one more line; false at the end of the file.
     fn read_ahead(&mut self, file: &Arc<str>) -> Result<bool, DataError> {
-        let mut line = String::new();
-        self.text.reader.read_line(&mut line).map_err(|error| read_error(file, error))?;
+        let mut line = Vec::new();
+        self.text.reader.read_until(self.end, &mut line).map_err(|error| read_error(file, error))?;
+        // The text was made UTF-8 already.
+        let line = String::from_utf8(line).unwrap_or_default();
         let some = !line.is_empty();
         if some {
             self.ahead.push_back(line);

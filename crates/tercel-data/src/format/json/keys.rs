@@ -372,7 +372,9 @@ impl Keys {
             .find(|(_, value)| value.as_array().is_some_and(|list| list.iter().any(Value::is_object)));
         let help = match list {
             Some((key, _)) => format!("`{key}` holds a list of objects: --list {key}"),
-            None => "say which keys hold it: --column x=KEY --column y=KEY (or range and bearing, latitude and longitude)".to_owned(),
+            None => "say which keys hold it: --column x=KEY --column y=KEY \
+                     (or range and bearing, latitude and longitude)"
+                .to_owned(),
         };
         DataError::unsettled(place.clone(), format!("{problem}; the keys are {}", names(object)), help)
     }

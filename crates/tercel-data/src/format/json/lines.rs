@@ -131,7 +131,15 @@ impl<R: BufRead> Lines<R> {
                     let help = "a text table with a header is read with --from csv; JSON begins with { or [";
                     return DataError::Corrupt { place: Place::line(&self.file, self.line), problem, help };
                 }
-                self.bad_line(format!("this is not a JSON object: {error}"))
+                let problem = format!("this is not a JSON object: {error}");
+                if self.buffer.windows(3).any(|word| word == b"NaN")
+                    || self.buffer.windows(8).any(|word| word == b"Infinity")
+                {
+                    let help =
+                        "JSON has no NaN or Infinity: write null, or leave such lines out: --on-error skip";
+                    return DataError::Corrupt { place: Place::line(&self.file, self.line), problem, help };
+                }
+                self.bad_line(problem)
             })
     }
 }
