@@ -59,7 +59,6 @@ fn arguments_that_do_not_fit_end_with_2() {
         ("usage_no_truth", &["evaluate", "radar.csv"]),
         ("usage_preset", &["config", "init", "--preset", "nope"]),
         ("usage_origin", &["convert", "radar.csv", "--origin", "95,8"]),
-        ("usage_stdin_of_another_program", &["track", "-", "--from", "autoferry"]),
     ] {
         assert_message(name, arguments, 2);
     }
