@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, Bearings, ImportOptions, Imported, ReadOptions, Source, Unit, import, import_from, read_truths,
+    Angles, Bearings, ImportOptions, Imported, LeftOut, ReadOptions, Recording, Source, Unit, import, import_from, read_truths,
 };
 
 use crate::console::Console;
@@ -207,6 +207,26 @@ impl ReadArguments {
     }
 }
 
+impl ReadArguments {
+    /// Opens recordings of one source, to be read scan by scan.
+    pub fn open<P: AsRef<Path>>(
+        &self,
+        source: Source,
+        paths: &[P],
+        options: ImportOptions,
+        console: &Console,
+    ) -> Result<Recording, Failure> {
+        let _progress = Progress::spinner(console, "reading");
+        let options = ImportOptions { read: self.options(), all_stations: self.all_stations, ..options };
+        match paths {
+            [path] if is_stdin(path.as_ref()) => {
+                Ok(Recording::from_reader(source, std::io::stdin(), STDIN, &options)?)
+            }
+            _ => Ok(Recording::open(source, paths, &options)?),
+        }
+    }
+}
+
 /// True for `-`.
 pub fn is_stdin(path: &Path) -> bool {
     path == Path::new("-")
@@ -217,7 +237,12 @@ pub fn note_left_out(imported: &Imported, console: &Console) {
     for note in &imported.notes {
         console.note(note);
     }
-    for left_out in &imported.left_out {
+    say_left_out(&imported.left_out, console);
+}
+
+/// Says how many rows are not in the tables, and why.
+pub fn say_left_out(left_out: &[LeftOut], console: &Console) {
+    for left_out in left_out {
         console.note(format_args!("left out {}: {}", counted(left_out.rows as u64, "row"), left_out.reason));
     }
 }

@@ -1,6 +1,7 @@
 //! `tercel track`.
 
 mod altitudes;
+mod feed;
 mod outcome;
 mod preset;
 mod rows;
@@ -17,7 +18,8 @@ use tercel_data::{DataError, ImportOptions, Imported, ReadOptions, Source};
 use tercel_pipeline::PipelineError;
 
 use self::outcome::Outcome;
-use self::preset::{Chosen, Recording};
+use self::feed::Feed;
+use self::preset::{Chosen, Kind};
 use self::rows::Rows;
 use self::run::{Run, Wanted};
 use self::teller::Teller;
@@ -79,9 +81,6 @@ pub struct TrackArguments {
     #[command(flatten)]
     score: ScoreArguments,
 }
-
-/// Scans of a recording that are looked at before it is tracked.
-const FIRST: usize = 20_000;
 
 const AFTER: &str = "\
 Examples:
@@ -161,34 +160,35 @@ impl TrackArguments {
         let truths = source == Source::Autoferry && self.truth.is_none();
         let options = ImportOptions { truths, origin: self.origin, ..ImportOptions::default() };
         let started = Instant::now();
-        let imported = self.read.import(source, &self.input, options, console)?;
-        let reading = started.elapsed();
-        note_left_out(&imported, console);
-        let Imported { detections, truths, left_out, .. } = imported;
+        let mut feed = Feed::open(&self.read, (source, &self.input), options, console)?;
         let chosen = match named {
             Some(chosen) => chosen,
-            None => Recording::whole(source, &detections).preset(console)?,
+            None => Kind::of(source, &feed.description, feed.first()).preset(feed.first(), console)?,
         };
-        let truths = self.truths(truths)?;
+        chosen.check(feed.first(), console)?;
+        let truths = self.truths(feed.truths.take())?;
         let wanted = self.wanted(truths.as_ref());
         if wanted.target.is_none() {
             console.note("the tracks are counted only; -o FILE writes them");
         }
         let mut run = Run::new(chosen.pipeline, wanted);
         let mut teller = Teller::default();
-        let first = &detections.scans[..detections.scans.len().min(FIRST)];
-        run.begin(origin::settle(detections.origin, self.origin)?, detections.description, first)?;
-        let progress = Progress::bar(console, "tracking", detections.scans.len());
-        for scan in detections.scans {
-            run.track(scan)?.map_err(|error| self.refused(error))?;
+        let origin = origin::settle(feed.origin, self.origin)?;
+        run.begin(origin, feed.description.clone(), feed.first())?;
+        teller.tell(run.notices(), console);
+        let progress = Progress::spinner(console, "tracking");
+        for scan in feed.by_ref() {
+            run.track(scan?)?.map_err(|error| self.refused(error))?;
             teller.tell(run.notices(), console);
             progress.step();
         }
         drop(progress);
         run.end()?.map_err(|error| self.refused(error))?;
         teller.tell(run.notices(), console);
+        let left_out = Account::of(feed.finish(console));
+        let reading = started.elapsed().saturating_sub(Duration::from_secs_f64(run.seconds()));
         let (config, configuration) = (chosen.config, chosen.name);
-        Ok(Outcome { run, truths, config, configuration, left_out: Account::of(left_out), bad: 0, reading })
+        Ok(Outcome { run, truths, config, configuration, left_out, bad: 0, reading })
     }
 
     fn run_stream(&self, console: &Console) -> Result<Outcome, Failure> {
@@ -202,7 +202,8 @@ impl TrackArguments {
             Some(chosen) => chosen,
             None => {
                 let first = next.as_ref().and_then(|scan| scan.as_ref().ok());
-                Recording::beginning(scans.description(), first).preset(console)?
+                let first = first.map_or(&[][..], std::slice::from_ref);
+                Kind::of(Source::Ndjson, &scans.description(), first).preset(&[], console)?
             }
         };
         let mut run = Run::new(chosen.pipeline, self.wanted(truths.as_ref()));

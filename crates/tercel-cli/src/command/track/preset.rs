@@ -1,9 +1,11 @@
 //! The configuration of a run: the one that the user named, or one that comes with the program.
 
+use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use tercel_data::Source;
-use tercel_data::table::{Description, Detections, Scan};
+use tercel_data::table::{Description, Scan};
 use tercel_pipeline::{Config, Pipeline};
 
 use crate::command::config;
@@ -29,26 +31,17 @@ impl Chosen {
 }
 
 /// What tells which preset fits.
-pub struct Recording {
+pub struct Kind {
     source: Source,
     description: Description,
     /// Whether detections carry an identity.
     identities: bool,
 }
 
-impl Recording {
-    /// A recording that was read to its end.
-    pub fn whole(source: Source, detections: &Detections) -> Self {
-        Recording {
-            source,
-            description: detections.description.clone(),
-            identities: detections.scans.iter().any(has_identity),
-        }
-    }
-
-    /// A stream of which the first scan is known.
-    pub fn beginning(description: Description, first: Option<&Scan>) -> Self {
-        Recording { source: Source::Ndjson, description, identities: first.is_some_and(has_identity) }
+impl Kind {
+    /// The kind of a recording with these first scans.
+    pub fn of(source: Source, description: &Description, first: &[Scan]) -> Self {
+        Kind { source, description: description.clone(), identities: first.iter().any(has_identity) }
     }
 
     /// What the recording was before it became a table. A recording of several sources is of a kind if all sensors are.
@@ -71,21 +64,88 @@ impl Recording {
         }
     }
 
-    /// The preset that fits. Since the user did not choose it, it is named on standard error.
-    pub fn preset(&self, console: &Console) -> Result<Chosen, Failure> {
+    /// The preset that fits. Since the user did not choose it, it is named on standard error. Where nothing is known of the objects,
+    /// their speed is told from the first scans.
+    pub fn preset(&self, first: &[Scan], console: &Console) -> Result<Chosen, Failure> {
         let name = self.preset_name();
         console.note(format_args!(
             "using the configuration `{name}`; `tercel config init --preset {name} -o FILE` writes it for changes"
         ));
-        if self.identities && name == "default" {
+        let (config, pipeline) = config::preset(name)?;
+        let chosen = Chosen { config, pipeline, name: name.to_owned() };
+        if name != "default" {
+            return Ok(chosen);
+        }
+        if self.identities {
             console.note(
                 "the detections have identities, but nothing says whose reports they are; for ships or aircraft: \
                  `tercel config init --preset ais -o FILE` (or adsb), and --config FILE",
             );
         }
-        let (config, pipeline) = config::preset(name)?;
-        Ok(Chosen { config, pipeline, name: name.to_owned() })
+        chosen.fitted(&self.description, first, console)
     }
+}
+
+/// Speeds of new objects that are tried when that of the preset starts no track, m/s per axis.
+const SPEEDS: [f64; 3] = [100.0, 300.0, 3.0];
+
+/// Scans by which a speed is tried.
+const TRIED: usize = 2_000;
+
+impl Chosen {
+    /// The same with the speed of new objects at which the first scans start tracks, where that of the preset starts none.
+    fn fitted(self, description: &Description, first: &[Scan], console: &Console) -> Result<Self, Failure> {
+        let scans = &first[..first.len().min(TRIED)];
+        if scans.len() < 3 || starts(&self.config, description, scans)? {
+            return Ok(self);
+        }
+        for speed in SPEEDS {
+            let config = self.config.clone().with_speed(speed);
+            if starts(&config, description, scans)? {
+                console.note(format_args!(
+                    "no track starts at the speed of the preset: objects of {speed} m/s per axis are expected; a \
+                     configuration with the right numbers does better (`tercel config init -o FILE`)"
+                ));
+                let pipeline = Pipeline::new(&config)?;
+                return Ok(Chosen { config, pipeline, ..self });
+            }
+        }
+        Ok(self)
+    }
+
+    /// Says what in the configuration cannot work with scans as far apart as these.
+    pub fn check(&self, first: &[Scan], console: &Console) -> Result<(), Failure> {
+        for sentence in tercel_pipeline::advice(&self.config, interval(first))? {
+            console.warn(sentence);
+        }
+        Ok(())
+    }
+}
+
+/// Whether these scans start a track that is believed.
+fn starts(config: &Config, description: &Description, scans: &[Scan]) -> Result<bool, Failure> {
+    let mut pipeline = Pipeline::new(config)?;
+    pipeline.expect(description, scans)?;
+    for scan in scans {
+        // What is refused here will be refused with its place when it is tracked.
+        if pipeline.push(scan.clone()).is_err() {
+            return Ok(true);
+        }
+    }
+    Ok(pipeline.finish().is_err() || pipeline.summary().confirmed > 0)
+}
+
+/// Median time between scans of the sensor that scans most, s.
+fn interval(first: &[Scan]) -> Option<f64> {
+    let mut times: HashMap<&Arc<str>, Vec<f64>> = HashMap::new();
+    for scan in first {
+        times.entry(&scan.sensor).or_default().push(scan.time);
+    }
+    let most = times.into_values().max_by_key(Vec::len)?;
+    let mut gaps: Vec<f64> =
+        most.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0).collect();
+    let middle = gaps.len() / 2;
+    (!gaps.is_empty()).then(|| *gaps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 fn has_identity(scan: &Scan) -> bool {
@@ -101,7 +161,7 @@ mod tests {
         let reports = SensorDescription { reports: true, identity: true, interval: None };
         let sensors = sensors.iter().map(|name| ((*name).to_owned(), reports.clone())).collect();
         let description = Description { source: was.map(str::to_owned), sensors };
-        Recording { source, description, identities: true }.preset_name()
+        Kind { source, description, identities: true }.preset_name()
     }
 
     #[test]
