@@ -6,7 +6,8 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, Bearings, ImportOptions, Imported, LeftOut, ReadOptions, Recording, Source, Unit, import, import_from, read_truths,
+    Angles, Bearings, ImportOptions, Imported, LeftOut, ReadOptions, Recording, Source, Unit, import,
+    import_from, read_truths,
 };
 
 use crate::console::Console;

@@ -123,6 +123,11 @@ impl Pipeline {
         std::mem::take(&mut self.notices)
     }
 
+    /// True when all that is known of sends reports.
+    pub fn reports(&self) -> bool {
+        !self.stations.is_empty() && self.stations.values().all(|station| station.detection.is_reports())
+    }
+
     /// Detections that came in and wait to be tracked.
     pub fn held(&self) -> usize {
         let open = self.stations.values().filter_map(|station| station.turns.as_ref()).map(Turns::held);

@@ -127,6 +127,14 @@ impl Config {
         self
     }
 
+    /// The same for new objects that move at this speed, m/s per axis. One that is no speed changes nothing.
+    pub fn with_speed(mut self, speed: f64) -> Self {
+        if let Ok(speed) = Positive::try_from(speed) {
+            self.motion.set_speed(speed);
+        }
+        self
+    }
+
     /// The configuration as TOML.
     pub fn to_toml(&self) -> String {
         // Every type here has a TOML form, so serialisation cannot fail; an empty text would say so.

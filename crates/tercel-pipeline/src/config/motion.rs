@@ -192,6 +192,22 @@ impl MotionConfig {
         }
     }
 
+    /// The same for new objects of this speed, m/s per axis, where it has one. Manoeuvres grow with it.
+    pub(super) fn set_speed(&mut self, new: Positive) {
+        match self {
+            MotionConfig::RandomWalk { .. } => {}
+            MotionConfig::ConstantVelocity(model) => model.speed = new,
+            MotionConfig::ConstantAcceleration { speed, .. }
+            | MotionConfig::CoordinatedTurn { speed, .. } => *speed = new,
+            MotionConfig::Singer(model) => model.speed = new,
+            MotionConfig::Turn(model) => model.speed = new,
+            MotionConfig::Learned(model) => model.speed = Some(new),
+            MotionConfig::Switching(switching) => {
+                switching.modes.iter_mut().for_each(|mode| mode.set_speed(new));
+            }
+        }
+    }
+
     /// Whether a Kalman filter is exact for it.
     pub(crate) fn is_linear(&self) -> bool {
         match self {

@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use tercel_data::ndjson::Scans;
 use tercel_data::table::{Origin, Scan, Truths};
-use tercel_data::{DataError, ImportOptions, Imported, ReadOptions, Source};
+use tercel_data::{DataError, ImportOptions, ReadOptions, Source};
 use tercel_pipeline::PipelineError;
 
-use self::outcome::Outcome;
 use self::feed::Feed;
+use self::outcome::Outcome;
 use self::preset::{Chosen, Kind};
 use self::rows::Rows;
 use self::run::{Run, Wanted};
@@ -26,7 +26,7 @@ use self::teller::Teller;
 use crate::account::Account;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::input::{self, OnError, ReadArguments, STDIN, is_stdin, note_left_out};
+use crate::input::{self, OnError, ReadArguments, STDIN, is_stdin};
 use crate::origin;
 use crate::output::{Target, keep_inputs};
 use crate::progress::Progress;
@@ -167,6 +167,9 @@ impl TrackArguments {
         };
         chosen.check(feed.first(), console)?;
         let truths = self.truths(feed.truths.take())?;
+        if let Some(truths) = &truths {
+            chosen.check_heights(truths, console);
+        }
         let wanted = self.wanted(truths.as_ref());
         if wanted.target.is_none() {
             console.note("the tracks are counted only; -o FILE writes them");

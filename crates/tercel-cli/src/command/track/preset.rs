@@ -5,7 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use tercel_data::Source;
-use tercel_data::table::{Description, Scan};
+use tercel_data::table::{Description, Scan, Truths};
+use tercel_pipeline::config::Measures;
 use tercel_pipeline::{Config, Pipeline};
 
 use crate::command::config;
@@ -113,6 +114,21 @@ impl Chosen {
         Ok(self)
     }
 
+    /// Says when objects have heights and a sensor of ranges is not told of any.
+    pub fn check_heights(&self, truths: &Truths, console: &Console) {
+        let high = truths.rows.iter().filter_map(|row| row.z).fold(0.0_f64, |high, z| high.max(z.abs()));
+        let flat = self.config.sensors.iter().find(|(_, sensor)| match &sensor.measures {
+            Measures::Polar(polar) => polar.height.is_none() && high > polar.range_deviation.get(),
+            Measures::Position(_) | Measures::Bearing(_) => false,
+        });
+        if let Some((name, _)) = flat {
+            console.warn(format_args!(
+                "the truth has heights up to {high} m, which are not used: ranges of `{name}` are taken as ranges over ground; \
+                 height = {high} in the polar table of [sensors.{name}], or a column `z` of the detections, corrects slant ranges"
+            ));
+        }
+    }
+
     /// Says what in the configuration cannot work with scans as far apart as these.
     pub fn check(&self, first: &[Scan], console: &Console) -> Result<(), Failure> {
         for sentence in tercel_pipeline::advice(&self.config, interval(first))? {
@@ -142,8 +158,7 @@ fn interval(first: &[Scan]) -> Option<f64> {
         times.entry(&scan.sensor).or_default().push(scan.time);
     }
     let most = times.into_values().max_by_key(Vec::len)?;
-    let mut gaps: Vec<f64> =
-        most.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0).collect();
+    let mut gaps: Vec<f64> = most.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0).collect();
     let middle = gaps.len() / 2;
     (!gaps.is_empty()).then(|| *gaps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -2,9 +2,11 @@
 
 use std::collections::HashMap;
 
-use tercel_data::table::{Description, Status, Track};
+use tercel_data::table::{Status, Track};
 
-/// When a track has a row. Its first and its last one are always there, and one whenever its status changes.
+/// When a track has a row. Its first and its last one are always there, and one whenever its status changes. Without a choice
+/// it is when a detection updated it, for reports, and after every scan otherwise: a report of one object says nothing of the
+/// others, so a row of every track at every report would only repeat what was known before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rows {
     /// When a detection updated it.
@@ -24,12 +26,6 @@ impl Rows {
             (_, Ok(seconds)) if seconds > 0.0 && seconds.is_finite() => Ok(Rows::Every(seconds)),
             _ => Err("expected updates, scans or a number of seconds above 0".to_owned()),
         }
-    }
-
-    /// What is written of a recording when nothing was asked for. A report of one object says nothing of the others, so a row
-    /// of every track at every report would only repeat what was known before.
-    pub fn of(recording: &Description) -> Rows {
-        if recording.all_report() { Rows::Updates } else { Rows::Scans }
     }
 }
 

@@ -73,7 +73,8 @@ impl Run {
             return Ok(());
         }
         self.pipeline.expect(&recording, first)?;
-        let rows = self.wanted.rows.unwrap_or_else(|| Rows::of(&recording));
+        let reports = self.pipeline.reports() || recording.all_report();
+        let rows = self.wanted.rows.unwrap_or(if reports { Rows::Updates } else { Rows::Scans });
         self.selection = Selection::new(rows, self.wanted.all);
         self.altitudes = Altitudes::new(origin);
         self.tracks.origin = origin;
