@@ -103,7 +103,7 @@ struct Scratch {
     misses: Vec<f64>,
     /// Detection probability of each track.
     detection: Vec<f64>,
-    /// Tracks so doubtful that no measurement, wherever it lies, is more likely theirs than clutter.
+    /// Tracks so doubtful that no measurement, wherever it lies, is more likely theirs than clutter of the background.
     hopeless: Vec<bool>,
     columns: Vec<Option<usize>>,
 }
@@ -150,7 +150,8 @@ impl<B: Clone> NearestNeighbour<B> {
                 let cost = -(track.existence * seen).ln() - innovation.log_likelihood + clutter;
                 if self.config.gate.contains(&innovation) && cost.is_finite() {
                     pairs.push((row, column, cost));
-                    least = least.min(cost - 0.5 * innovation.nis);
+                    let background = filter.ln_clutter(&scan.measurements[column], scan.clutter.background());
+                    least = least.min(cost - 0.5 * innovation.nis - clutter + background);
                 }
             }
             misses.push(miss);
@@ -171,7 +172,7 @@ impl<B: Clone> NearestNeighbour<B> {
         let mut free = vec![true; measurements];
         columns.iter().flatten().for_each(|&column| free[column] = false);
         let tracks = &self.objects.tracks;
-        pairs.retain(|&(row, column, _)| hopeless[row] && free[column]);
+        pairs.retain(|&(row, column, _)| hopeless[row] && columns[row].is_none() && free[column]);
         if pairs.is_empty() {
             return;
         }
