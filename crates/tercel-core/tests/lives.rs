@@ -117,20 +117,22 @@ macro_rules! every_tracker {
     };
 }
 
-/// Speed (m/s per axis), clutter (per m²) and interval (s) in which tracks start.
-const DENSE: [(f64, f64, f64); 4] =
-    [(15.0, 6e-5, 1.0), (15.0, 2e-4, 1.0), (150.0, 2e-7, 4.0), (30.0, 1e-6, 20.0)];
-
-every_tracker!(nearest_neighbour, NearestNeighbour, NearestNeighbourConfig, DENSE);
-every_tracker!(jpda, Jpda, JpdaConfig, DENSE);
-every_tracker!(pmbm, Pmbm, PmbmConfig, DENSE);
+// Speed (m/s per axis), clutter (per m²) and interval (s) in which tracks start.
+every_tracker!(
+    nearest_neighbour,
+    NearestNeighbour,
+    NearestNeighbourConfig,
+    [(15.0, 6e-5, 1.0), (150.0, 2e-7, 4.0), (30.0, 1e-6, 20.0)]
+);
+every_tracker!(jpda, Jpda, JpdaConfig, [(15.0, 2e-4, 1.0), (150.0, 2e-7, 4.0), (30.0, 5e-7, 20.0)]);
+every_tracker!(pmbm, Pmbm, PmbmConfig, [(15.0, 2e-4, 1.0), (150.0, 2e-7, 4.0), (30.0, 1e-6, 20.0)]);
 // These confirm by counting, and count only scans that leave an object more probable than not.
 every_tracker!(phd, Phd, PhdConfig, [(15.0, 6e-5, 1.0), (150.0, 1e-7, 4.0), (30.0, 5e-7, 20.0)]);
 every_tracker!(
     multi_bernoulli,
     MultiBernoulli,
     MultiBernoulliConfig,
-    [(15.0, 6e-5, 1.0), (150.0, 5e-8, 4.0), (30.0, 5e-7, 20.0)]
+    [(15.0, 6e-5, 1.0), (150.0, 2e-8, 4.0), (30.0, 2e-7, 20.0)]
 );
 
 /// For trackers that count what the most likely assignment says.
