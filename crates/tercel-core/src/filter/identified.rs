@@ -137,7 +137,7 @@ impl<B> NamedBelief<B> {
     /// Keeps the heavier of two names, with its share in both.
     fn mix(&mut self, weight: f64, other: (Option<Identity>, f32), other_weight: f64) {
         let total = weight + other_weight;
-        if !(total > 0.0) {
+        if total <= 0.0 || total.is_nan() {
             return;
         }
         let own = f64::from(self.sure) * weight / total;
@@ -220,7 +220,7 @@ impl<F> Identified<F> {
         let spread: f64 = axes.clone().map(|i| before.covariance[(i, i)] + after.covariance[(i, i)]).sum();
         let variance = belief.moved().powi(2) + 0.5 * spread;
         let square = axes.map(|i| (after.mean[i] - before.mean[i]).powi(2)).sum::<f64>() / variance;
-        if innovation.dof() != 2 || !(square <= 2.0 * REACH * REACH) {
+        if innovation.dof() != 2 || square > 2.0 * REACH * REACH || square.is_nan() {
             return None;
         }
         let ln_factor = self.weigh(belief, measurement.identity).0.ln();
