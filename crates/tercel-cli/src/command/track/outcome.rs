@@ -39,10 +39,11 @@ pub struct Outcome {
 impl Outcome {
     /// Scores the tracks, puts the outputs in their places and prints the summary.
     pub fn write(mut self, arguments: &TrackArguments, console: &Console) -> Result<(), Failure> {
-        let Summary { late_rows, ahead_rows, ignored_rows, .. } = self.run.summary();
+        let Summary { late_rows, ahead_rows, ignored_rows, repeated, .. } = self.run.summary();
         self.left_out.add("a scan that came too late", late_rows);
         self.left_out.add("a time far ahead of all others", ahead_rows);
         self.left_out.add("a sensor that the configuration ignores", ignored_rows);
+        self.left_out.add("a detection that repeats another of its scan", repeated);
         self.left_out.add("a line or scan that cannot be used", self.bad);
         let evaluation = match &self.truths {
             Some(truths) => {
@@ -150,7 +151,7 @@ impl Outcome {
                 "updated": summary.updates,
                 "started": summary.starts,
                 "clutter": summary.clutter,
-                "left_out": summary.late_rows + summary.ahead_rows + summary.ignored_rows,
+                "left_out": summary.late_rows + summary.ahead_rows + summary.ignored_rows + summary.repeated,
             },
             "left_out": self.left_out.json(),
             "confirmed_tracks": summary.confirmed,

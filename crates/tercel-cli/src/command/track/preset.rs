@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use tercel_data::Source;
-use tercel_data::table::{Description, Scan, Truths};
+use tercel_data::table::{Description, Observation, Scan, Truths};
 use tercel_pipeline::config::Measures;
 use tercel_pipeline::{Config, Pipeline};
 
@@ -87,29 +87,38 @@ impl Kind {
     }
 }
 
-/// Speeds of new objects that are tried when that of the preset starts no track, m/s per axis.
-const SPEEDS: [f64; 3] = [100.0, 300.0, 3.0];
+/// Speeds of new objects that are tried when the preset starts no track, m/s per axis; first its own.
+const SPEEDS: [Option<f64>; 4] = [None, Some(100.0), Some(300.0), Some(3.0)];
 
 /// Scans by which a speed is tried.
 const TRIED: usize = 2_000;
 
 impl Chosen {
-    /// The same with the speed of new objects at which the first scans start tracks, where that of the preset starts none.
+    /// The same with the numbers at which the first scans start tracks, where those of the preset start none: the speed of new
+    /// objects, and no more false detections than there are detections.
     fn fitted(self, description: &Description, first: &[Scan], console: &Console) -> Result<Self, Failure> {
         let scans = &first[..first.len().min(TRIED)];
         if scans.len() < 3 || starts(&self.config, description, scans)? {
             return Ok(self);
         }
-        for speed in SPEEDS {
-            let config = self.config.clone().with_speed(speed);
-            if starts(&config, description, scans)? {
-                console.note(format_args!(
-                    "no track starts at the speed of the preset: objects of {speed} m/s per axis are expected; a \
-                     configuration with the right numbers does better (`tercel config init -o FILE`)"
-                ));
-                let pipeline = Pipeline::new(&config)?;
-                return Ok(Chosen { config, pipeline, ..self });
+        let all = density(scans);
+        for (clutter, speed) in [None, all].into_iter().flat_map(|clutter| SPEEDS.map(|speed| (clutter, speed))) {
+            let mut config = self.config.clone();
+            config = speed.into_iter().fold(config, Config::with_speed);
+            config = clutter.into_iter().fold(config, Config::with_clutter_below);
+            if config == self.config || !starts(&config, description, scans)? {
+                continue;
             }
+            let mut expected = Vec::new();
+            expected.extend(speed.map(|speed| format!("objects of {speed} m/s per axis")));
+            expected.extend(clutter.map(|density| format!("{density:.0e} false detections per scan and m²")));
+            console.note(format_args!(
+                "no track starts with the numbers of the preset: {} are expected; a configuration with the right numbers does \
+                 better (`tercel config init -o FILE`)",
+                expected.join(" and "),
+            ));
+            let pipeline = Pipeline::new(&config)?;
+            return Ok(Chosen { config, pipeline, ..self });
         }
         Ok(self)
     }
@@ -149,6 +158,22 @@ fn starts(config: &Config, description: &Description, scans: &[Scan]) -> Result<
         }
     }
     Ok(pipeline.finish().is_err() || pipeline.summary().confirmed > 0)
+}
+
+/// Detections per scan and m² of the square that holds them all: there cannot be more false ones, on average.
+fn density(scans: &[Scan]) -> Option<f64> {
+    let mut places = Vec::new();
+    for detection in scans.iter().flat_map(|scan| &scan.detections) {
+        if let Observation::Position { x, y, .. } = detection.observation {
+            places.push([x, y]);
+        }
+    }
+    let extent = |axis: usize| {
+        let along = || places.iter().map(|place| place[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    let side = extent(0).max(extent(1));
+    (side > 0.0).then(|| places.len() as f64 / scans.len() as f64 / (side * side))
 }
 
 /// Median time between scans of the sensor that scans most, s.
