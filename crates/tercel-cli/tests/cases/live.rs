@@ -101,7 +101,9 @@ fn a_stream_of_reports_says_which_configuration_it_needs() {
 
 #[test]
 fn other_formats_come_through_standard_input() {
-    for (file, from) in [("ais_three_ships.csv", "ais"), ("ais_tagged.nmea", "nmea"), ("basestation.csv", "sbs")] {
+    for (file, from) in
+        [("ais_three_ships.csv", "ais"), ("ais_tagged.nmea", "nmea"), ("basestation.csv", "sbs")]
+    {
         let mut child = command()
             .args(["track", "-", "--from", from])
             .stdin(std::fs::File::open(recording(file)).unwrap())

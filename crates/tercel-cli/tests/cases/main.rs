@@ -18,15 +18,15 @@ use serde_json::Value;
 use support::{Run, run};
 
 /// A run of `tercel track` and what it wrote.
-pub struct Tracked {
-    pub summary: Value,
-    pub stderr: String,
-    pub rows: Vec<Value>,
+struct Tracked {
+    summary: Value,
+    stderr: String,
+    rows: Vec<Value>,
 }
 
 impl Tracked {
     /// Tracks files; the table of tracks is read back.
-    pub fn of(files: &[&Path], arguments: &[&str]) -> Self {
+    fn of(files: &[&Path], arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let table = folder.path().join("tracks.ndjson");
         let mut all: Vec<&str> = vec!["track"];
@@ -40,7 +40,7 @@ impl Tracked {
     }
 
     /// Tracks a text that is written to a file of this name.
-    pub fn of_text(name: &str, text: &str, arguments: &[&str]) -> Self {
+    fn of_text(name: &str, text: &str, arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join(name);
         std::fs::write(&file, text).unwrap();
@@ -48,7 +48,7 @@ impl Tracked {
     }
 
     /// Tracks a text with a configuration.
-    pub fn of_text_with(name: &str, text: &str, config: &str) -> Self {
+    fn of_text_with(name: &str, text: &str, config: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("tracker.toml");
         std::fs::write(&file, config).unwrap();
@@ -56,44 +56,44 @@ impl Tracked {
     }
 
     /// Confirmed tracks.
-    pub fn tracks(&self) -> u64 {
+    fn tracks(&self) -> u64 {
         self.summary["confirmed_tracks"].as_u64().unwrap()
     }
 
     /// Detections that the tracker took in.
-    pub fn detections(&self) -> u64 {
+    fn detections(&self) -> u64 {
         self.summary["detections"]["tracked"].as_u64().unwrap()
     }
 
     /// Detections that became part of a track.
-    pub fn part_of_tracks(&self) -> u64 {
+    fn part_of_tracks(&self) -> u64 {
         let uses = &self.summary["detections"];
         uses["updated"].as_u64().unwrap() + uses["started"].as_u64().unwrap()
     }
 
-    pub fn updated(&self) -> u64 {
+    fn updated(&self) -> u64 {
         self.summary["detections"]["updated"].as_u64().unwrap()
     }
 
     /// Rows that were left out, by reason.
-    pub fn left_out(&self) -> Vec<(String, u64)> {
+    fn left_out(&self) -> Vec<(String, u64)> {
         let reason = |left: &Value| (text(left, "reason"), left["rows"].as_u64().unwrap());
         self.summary["left_out"].as_array().unwrap().iter().map(reason).collect()
     }
 
     /// A score against the truth.
-    pub fn score(&self, name: &str) -> f64 {
+    fn score(&self, name: &str) -> f64 {
         self.summary["scores"]["metrics"][name].as_f64().unwrap()
     }
 
     /// The last row of each track in which it was believed.
-    pub fn ends(&self) -> BTreeMap<u64, &Value> {
+    fn ends(&self) -> BTreeMap<u64, &Value> {
         let believed = self.rows.iter().filter(|row| row["status"] == "confirmed");
         believed.map(|row| (row["track"].as_u64().unwrap(), row)).collect()
     }
 
     /// The names of the objects that the rows of each track have.
-    pub fn identities(&self) -> BTreeMap<u64, BTreeSet<String>> {
+    fn identities(&self) -> BTreeMap<u64, BTreeSet<String>> {
         let mut names: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
         for row in self.rows.iter().filter(|row| row["identity"].is_string()) {
             names.entry(row["track"].as_u64().unwrap()).or_default().insert(text(row, "identity"));
@@ -102,7 +102,7 @@ impl Tracked {
     }
 
     /// Checks that every track has one name and every name one track.
-    pub fn assert_names(&self, case: &str) {
+    fn assert_names(&self, case: &str) {
         let names = self.identities();
         assert!(names.values().all(|names| names.len() == 1), "{case}: {names:?}");
         let distinct: BTreeSet<_> = names.values().flatten().collect();
@@ -112,36 +112,36 @@ impl Tracked {
 }
 
 /// What is right for a file.
-pub struct Case {
-    pub file: &'static str,
-    pub arguments: &'static [&'static str],
-    pub tracks: u64,
-    pub detections: u64,
+struct Case {
+    file: &'static str,
+    arguments: &'static [&'static str],
+    tracks: u64,
+    detections: u64,
     /// Parts of the reasons for which rows are left out, and how many there are.
-    pub left_out: &'static [(&'static str, u64)],
+    left_out: &'static [(&'static str, u64)],
     /// What must stand on standard error.
-    pub says: &'static [&'static str],
+    says: &'static [&'static str],
 }
 
 impl Case {
-    pub const fn new(file: &'static str, tracks: u64, detections: u64) -> Self {
+    const fn new(file: &'static str, tracks: u64, detections: u64) -> Self {
         Case { file, arguments: &[], tracks, detections, left_out: &[], says: &[] }
     }
 
-    pub const fn with(self, arguments: &'static [&'static str]) -> Self {
+    const fn with(self, arguments: &'static [&'static str]) -> Self {
         Case { arguments, ..self }
     }
 
-    pub const fn leaves_out(self, left_out: &'static [(&'static str, u64)]) -> Self {
+    const fn leaves_out(self, left_out: &'static [(&'static str, u64)]) -> Self {
         Case { left_out, ..self }
     }
 
-    pub const fn says(self, says: &'static [&'static str]) -> Self {
+    const fn says(self, says: &'static [&'static str]) -> Self {
         Case { says, ..self }
     }
 
     /// Runs it and checks all that is said of it.
-    pub fn check(&self) -> Tracked {
+    fn check(&self) -> Tracked {
         let tracked = Tracked::of(&[&recording(self.file)], self.arguments);
         let Tracked { summary, stderr, .. } = &tracked;
         let case = self.file;
@@ -160,27 +160,27 @@ impl Case {
 }
 
 /// A file of the readers' tests.
-pub fn recording(name: &str) -> PathBuf {
+fn recording(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tercel-data/tests/cases").join(name)
 }
 
 /// A file of a simulated case.
-pub fn simulation(name: &str) -> PathBuf {
+fn simulation(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/tracking").join(name)
 }
 
 /// A text value of a row.
-pub fn text(row: &Value, key: &str) -> String {
+fn text(row: &Value, key: &str) -> String {
     row[key].as_str().unwrap().to_owned()
 }
 
 /// A number of a row.
-pub fn number(row: &Value, key: &str) -> f64 {
+fn number(row: &Value, key: &str) -> f64 {
     row[key].as_f64().unwrap_or_else(|| panic!("no `{key}` in {row}"))
 }
 
 /// Runs something that must be refused for its input, and returns what it says.
-pub fn refused(file: &Path, arguments: &[&str]) -> String {
+fn refused(file: &Path, arguments: &[&str]) -> String {
     let run: Run = run(["track", file.to_str().unwrap()].iter().chain(arguments));
     assert_eq!(run.code, 3, "{}: {}", file.display(), run.transcript());
     assert!(run.stderr.contains("help: "), "{}", run.stderr);
@@ -188,6 +188,6 @@ pub fn refused(file: &Path, arguments: &[&str]) -> String {
 }
 
 /// An error of a measurement, between -1 and 1, that is the same on every machine.
-pub fn jitter(number: usize) -> f64 {
+fn jitter(number: usize) -> f64 {
     2.0 * (0.618_033_988_749_894_9 * (number * number + 7 * number) as f64).fract() - 1.0
 }

@@ -117,7 +117,8 @@ fn names_with_a_quote_that_is_never_closed_cost_no_row() {
     for (row, (time, ship, [lat, lon])) in reports(&SHIPS, 10, 10.0, 2.0).into_iter().enumerate() {
         let name = if row % 11 == 4 { "\"OLE" } else { "ALFA" };
         let (minute, second) = ((time / 60.0).floor(), time % 60.0);
-        writeln!(text, "{},2024-03-05T10:{minute:02.0}:{second:06.3},{lat:.6},{lon:.6},{name}", ship.mmsi).unwrap();
+        writeln!(text, "{},2024-03-05T10:{minute:02.0}:{second:06.3},{lat:.6},{lon:.6},{name}", ship.mmsi)
+            .unwrap();
     }
     let tracked = Tracked::of_text("ships.csv", &text, &[]);
     assert_eq!((tracked.tracks(), tracked.detections()), (3, 30), "{}", tracked.stderr);
@@ -146,8 +147,12 @@ fn tracks_of_ships_go_to_a_map_with_their_names() {
     std::fs::write(&ships, table(&reports(&SHIPS, 10, 10.0, 2.0))).unwrap();
     run(["track", ships.to_str().unwrap(), "-o", map.to_str().unwrap()]).succeeded();
     let map: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&map).unwrap()).unwrap();
-    let mut names: Vec<&str> =
-        map["features"].as_array().unwrap().iter().map(|f| f["properties"]["name"].as_str().unwrap()).collect();
+    let mut names: Vec<&str> = map["features"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f["properties"]["name"].as_str().unwrap())
+        .collect();
     names.sort_unstable();
     assert_eq!(names, ["219000101", "219000102", "219000103"]);
 }
