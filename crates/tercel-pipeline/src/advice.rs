@@ -117,9 +117,31 @@ fn idle(management: &ManagementConfig, interval: f64) -> Option<String> {
     })
 }
 
-/// Whether a track of an object that is seen in every scan is confirmed; `None` where no sensor sees or can place a new object,
-/// or where it cannot be said.
+/// Whether a track of an object that is seen in every scan is confirmed, before one of the sensors at least; `None` where no
+/// sensor sees or can place a new object, or where it cannot be said.
 fn starts_within(config: &Config, interval: f64) -> Result<Option<bool>, PipelineError> {
+    let used: Vec<_> =
+        config.sensors.iter().filter(|(name, _)| !config.input.ignore.contains(name)).collect();
+    let mut posts: Vec<[f64; 2]> = Vec::new();
+    for (_, sensor) in &used {
+        if !posts.contains(&sensor.position) {
+            posts.push(sensor.position);
+        }
+    }
+    for post in posts {
+        if starts_before(config, interval, post)? {
+            return Ok(Some(true));
+        }
+    }
+    let can_place = |measures: &Measures| match measures {
+        Measures::Position(_) | Measures::Polar(_) => true,
+        Measures::Bearing(bearing) => bearing.start_range.is_some(),
+    };
+    Ok(used.iter().any(|(_, sensor)| can_place(&sensor.measures)).then_some(false))
+}
+
+/// Whether a track is confirmed of an object that passes in front of this place and is seen by every sensor.
+fn starts_before(config: &Config, interval: f64, post: [f64; 2]) -> Result<bool, PipelineError> {
     let input = InputConfig {
         ignore: config.input.ignore.clone(),
         out_of_order: OutOfOrder::Drop,
@@ -133,26 +155,19 @@ fn starts_within(config: &Config, interval: f64) -> Result<Option<bool>, Pipelin
         let time = f64::from(step) * interval;
         // In the middle of its way the object is nearest.
         let along = speed * (time - f64::from(empty + seen / 2) * interval);
-        for (name, sensor) in config.sensors.iter().filter(|(name, _)| !config.input.ignore.contains(name)) {
-            let [x, y] = [sensor.position[0] + along, sensor.position[1] + distance];
-            let observation = observation(&sensor.measures, sensor.position, [x, y]);
+        let place = [post[0] + along, post[1] + distance];
+        for (name, sensor) in &config.sensors {
+            let observation = observation(&sensor.measures, sensor.position, place);
             let detections =
                 if step < empty { Vec::new() } else { vec![Detection::new(u64::from(step), observation)] };
             let rows = pipeline.push(Scan::new(time, name.as_str(), detections))?;
             if rows.iter().any(|row| row.status == Status::Confirmed) {
-                return Ok(Some(true));
+                return Ok(true);
             }
         }
     }
     // Plots of an antenna that turns are tracked when its turn is over.
-    if pipeline.finish()?.iter().any(|row| row.status == Status::Confirmed) {
-        return Ok(Some(true));
-    }
-    let can_place = |measures: &Measures| match measures {
-        Measures::Position(_) | Measures::Polar(_) => true,
-        Measures::Bearing(bearing) => bearing.start_range.is_some(),
-    };
-    Ok(config.sensors.values().any(|sensor| can_place(&sensor.measures)).then_some(false))
+    Ok(pipeline.finish()?.iter().any(|row| row.status == Status::Confirmed))
 }
 
 /// What a sensor at `from` says of an object at a place.
@@ -239,6 +254,19 @@ mod tests {
         let said = advice(&config("phd", 1e-3, 15.0), Some(1.0)).unwrap();
         assert!(said[0].contains("no track can start with phd") && said[0].contains("1e-3"), "{said:?}");
         assert!(said[0].contains("15 m/s") && said[0].contains("every 1 s"), "{said:?}");
+    }
+
+    #[test]
+    fn stations_far_apart_see_one_object() {
+        let station = |name: &str, x: f64| {
+            format!(
+                "[sensors.{name}]\nmeasures = {{ polar = {{ range_deviation = 5.0, bearing_deviation = 0.002 }} }}\n\
+                 position = [{x:?}, 0.0]\nclutter = {{ uniform = {{ density = 1e-8 }} }}\n"
+            )
+        };
+        let motion = "[motion]\nconstant_velocity = { acceleration_density = 0.1, speed = 15.0 }\n";
+        let text = [motion, &station("north", 0.0), &station("south", 6_000.0)].concat();
+        assert!(advice(&Config::parse(&text).unwrap(), Some(1.0)).unwrap().is_empty());
     }
 
     #[test]

@@ -29,11 +29,13 @@ pub(super) fn scans(
     remarks.notes.extend(gap(&groups));
     let count = rows.len();
     let mut rows: Vec<Option<(DetectionRow, usize)>> = rows.into_iter().map(Some).collect();
-    let mut repeated = 0;
+    let (mut repeated, mut empty) = (0, 0);
     let mut scans = Vec::with_capacity(groups.len());
     for group in groups {
         let mut scan: Option<Scan> = None;
+        let mut holds_nothing = 0;
         for (row, at) in group.members.into_iter().filter_map(|member| rows[member].take()) {
+            holds_nothing += usize::from(row.detection.is_none());
             match &mut scan {
                 None => scan = Some(row.start()),
                 Some(scan) => {
@@ -43,17 +45,23 @@ pub(super) fn scans(
                 }
             }
         }
+        // Beside detections such a row says nothing, and alone it is a scan in which nothing was seen.
+        if scan.as_ref().is_some_and(|scan| !scan.detections.is_empty()) {
+            empty += holds_nothing;
+        }
         scans.extend(scan.map(|mut scan| {
             repeated += without_repetitions(&mut scan, options.drop_repeated);
             scan
         }));
     }
     scans.sort_by(|one, next| one.time.total_cmp(&next.time));
+    remarks.leave_out("no measurement, beside detections of its scan", empty);
     if repeated > 0 && options.drop_repeated {
         remarks.leave_out("a repeated row".to_owned(), repeated);
     } else if repeated > 0 {
         remarks.notes.push(format!(
-            "{repeated} of {count} rows repeat another row of their scan; --drop-repeated leaves them out"
+            "{repeated} of {count} rows repeat another row of their scan; tracking takes one of each, and --drop-repeated \
+             leaves the others out of tables"
         ));
     }
     Ok(scans)

@@ -135,6 +135,18 @@ impl Config {
         self
     }
 
+    /// The same with no more false detections than this per scan and square metre, where sensors place what they see. A number
+    /// that is no density changes nothing.
+    pub fn with_clutter_below(mut self, density: f64) -> Self {
+        let Ok(density) = Positive::try_from(density) else { return self };
+        for sensor in self.sensors.values_mut() {
+            if !matches!(sensor.measures, Measures::Bearing(_)) {
+                sensor.clutter.limit(density);
+            }
+        }
+        self
+    }
+
     /// The configuration as TOML.
     pub fn to_toml(&self) -> String {
         // Every type here has a TOML form, so serialisation cannot fail; an empty text would say so.

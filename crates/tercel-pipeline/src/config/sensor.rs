@@ -208,6 +208,19 @@ pub struct MapClutter {
     pub memory: Positive,
 }
 
+impl ClutterConfig {
+    /// Lowers the density to this one, if it is higher.
+    pub(super) fn limit(&mut self, limit: Positive) {
+        let density = match self {
+            ClutterConfig::Uniform(uniform) => &mut uniform.density,
+            ClutterConfig::Map(map) => &mut map.background,
+        };
+        if density.get() > limit.get() {
+            *density = limit;
+        }
+    }
+}
+
 impl Measures {
     pub(super) fn is_linear(&self) -> bool {
         match self {

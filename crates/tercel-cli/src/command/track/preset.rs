@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use tercel_data::Source;
-use tercel_data::table::{Description, Scan, Truths};
+use tercel_data::table::{Description, Observation, Scan, Truths};
 use tercel_pipeline::config::Measures;
-use tercel_pipeline::{Config, Pipeline};
+use tercel_pipeline::{Config, Pipeline, Summary};
 
 use crate::command::config;
 use crate::console::Console;
@@ -87,31 +87,40 @@ impl Kind {
     }
 }
 
-/// Speeds of new objects that are tried when that of the preset starts no track, m/s per axis.
-const SPEEDS: [f64; 3] = [100.0, 300.0, 3.0];
+/// Speeds of new objects that are tried when the preset starts no track, m/s per axis; first its own.
+const SPEEDS: [Option<f64>; 4] = [None, Some(100.0), Some(300.0), Some(3.0)];
 
 /// Scans by which a speed is tried.
 const TRIED: usize = 2_000;
 
 impl Chosen {
-    /// The same with the speed of new objects at which the first scans start tracks, where that of the preset starts none.
+    /// The same with numbers that fit the first scans, where those of the preset start no track: the speed of new objects, and
+    /// no more false detections than there are detections. The first that explain about as much as any do are taken.
     fn fitted(self, description: &Description, first: &[Scan], console: &Console) -> Result<Self, Failure> {
         let scans = &first[..first.len().min(TRIED)];
-        if scans.len() < 3 || starts(&self.config, description, scans)? {
+        if scans.len() < 3 || trial(&self.config, description, scans)? != Some((0, 0)) {
             return Ok(self);
         }
-        for speed in SPEEDS {
-            let config = self.config.clone().with_speed(speed);
-            if starts(&config, description, scans)? {
-                console.note(format_args!(
-                    "no track starts at the speed of the preset: objects of {speed} m/s per axis are expected; a \
-                     configuration with the right numbers does better (`tercel config init -o FILE`)"
-                ));
-                let pipeline = Pipeline::new(&config)?;
-                return Ok(Chosen { config, pipeline, ..self });
+        let mut fits = Vec::new();
+        for clutter in [None, density(scans)] {
+            for speed in SPEEDS {
+                let config = speed.into_iter().fold(self.config.clone(), Config::with_speed);
+                let config = clutter.into_iter().fold(config, Config::with_clutter_below);
+                if let Some((1.., updates)) = trial(&config, description, scans)? {
+                    fits.push((updates, config, expectation(speed, clutter)));
+                }
             }
         }
-        Ok(self)
+        let most = fits.iter().map(|fit| fit.0).max().unwrap_or(0);
+        let Some((_, config, expected)) = fits.into_iter().find(|fit| 10 * fit.0 >= 9 * most) else {
+            return Ok(self);
+        };
+        console.note(format_args!(
+            "no track starts with the numbers of the preset: {expected} are expected; a configuration with the right numbers \
+             does better (`tercel config init -o FILE`)"
+        ));
+        let pipeline = Pipeline::new(&config)?;
+        Ok(Chosen { config, pipeline, ..self })
     }
 
     /// Says when objects have heights and a sensor of ranges is not told of any.
@@ -138,17 +147,44 @@ impl Chosen {
     }
 }
 
-/// Whether these scans start a track that is believed.
-fn starts(config: &Config, description: &Description, scans: &[Scan]) -> Result<bool, Failure> {
+/// How many tracks these scans confirm, and how many detections update tracks where one is confirmed; nothing when a scan is
+/// refused, which will be said with its place when it is tracked.
+fn trial(config: &Config, description: &Description, scans: &[Scan]) -> Result<Option<(u64, u64)>, Failure> {
     let mut pipeline = Pipeline::new(config)?;
     pipeline.expect(description, scans)?;
     for scan in scans {
-        // What is refused here will be refused with its place when it is tracked.
         if pipeline.push(scan.clone()).is_err() {
-            return Ok(true);
+            return Ok(None);
         }
     }
-    Ok(pipeline.finish().is_err() || pipeline.summary().confirmed > 0)
+    if pipeline.finish().is_err() {
+        return Ok(None);
+    }
+    let Summary { confirmed, updates, .. } = pipeline.summary();
+    Ok(Some((confirmed, if confirmed > 0 { updates } else { 0 })))
+}
+
+/// What is expected of objects and clutter, in words.
+fn expectation(speed: Option<f64>, clutter: Option<f64>) -> String {
+    let speed = speed.map(|speed| format!("objects of {speed} m/s per axis"));
+    let clutter = clutter.map(|density| format!("{density:.0e} false detections per scan and m²"));
+    speed.into_iter().chain(clutter).collect::<Vec<_>>().join(" and ")
+}
+
+/// Detections per scan and m² of the square that holds them all: there cannot be more false ones, on average.
+fn density(scans: &[Scan]) -> Option<f64> {
+    let mut places = Vec::new();
+    for detection in scans.iter().flat_map(|scan| &scan.detections) {
+        if let Observation::Position { x, y, .. } = detection.observation {
+            places.push([x, y]);
+        }
+    }
+    let extent = |axis: usize| {
+        let along = || places.iter().map(|place| place[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    let side = extent(0).max(extent(1));
+    (side > 0.0).then(|| places.len() as f64 / scans.len() as f64 / (side * side))
 }
 
 /// Median time between scans of the sensor that scans most, s.
