@@ -1,13 +1,13 @@
 //! Which file is read, and as what.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tercel_data::table::Truths;
 use tercel_data::{
-    Angles, Bearings, ImportOptions, Imported, LeftOut, ReadOptions, Recording, Source, Unit, import,
-    import_from, read_truths,
+    Angles, Bearings, DataError, ImportOptions, Imported, LeftOut, ReadOptions, Recording, Source, Unit,
+    import, import_from, read_truths,
 };
 
 use crate::console::Console;
@@ -209,21 +209,18 @@ impl ReadArguments {
 }
 
 impl ReadArguments {
-    /// Opens recordings of one source, to be read scan by scan.
-    pub fn open<P: AsRef<Path>>(
+    /// What opens recordings of one source, to be read scan by scan.
+    pub fn opener(
         &self,
         source: Source,
-        paths: &[P],
+        paths: &[PathBuf],
         options: ImportOptions,
-        console: &Console,
-    ) -> Result<Recording, Failure> {
-        let _progress = Progress::spinner(console, "reading");
+    ) -> impl FnOnce() -> Result<Recording, DataError> + Send + use<> {
         let options = ImportOptions { read: self.options(), all_stations: self.all_stations, ..options };
-        match paths {
-            [path] if is_stdin(path.as_ref()) => {
-                Ok(Recording::from_reader(source, std::io::stdin(), STDIN, &options)?)
-            }
-            _ => Ok(Recording::open(source, paths, &options)?),
+        let paths = paths.to_vec();
+        move || match &paths[..] {
+            [path] if is_stdin(path) => Recording::from_reader(source, std::io::stdin(), STDIN, &options),
+            _ => Recording::open(source, &paths, &options),
         }
     }
 }

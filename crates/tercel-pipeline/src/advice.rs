@@ -11,11 +11,15 @@ use crate::{Pipeline, PipelineError};
 /// Scans before the object of a trial appears, and scans in which it is seen.
 const TRIAL: (u32, u32) = (10, 30);
 
+/// Intervals that are tried when none is known, s.
+const USUAL: [f64; 3] = [1.0, 3.0, 10.0];
+
 /// How far from the sensors the object of a trial passes when nothing says where they look, m.
 const DISTANCE: f64 = 1_000.0;
 
 /// What the user of a configuration should know: that no track can start, and keys that have no effect. Each is a sentence with
-/// the numbers that cause it. `interval` is the time between two scans of a sensor, s, if it is known; a second if not.
+/// the numbers that cause it. `interval` is the time between two scans of a sensor, s, if it is
+/// known; if not, what starts at none of a few usual intervals is said.
 ///
 /// Whether tracks start is tried: the tracker that the configuration describes gets one object, which appears after some empty
 /// scans, moves as fast as new objects are expected to, and is seen in every scan, with no false detection around. What is not
@@ -41,9 +45,14 @@ const DISTANCE: f64 = 1_000.0;
 /// When the configuration makes no tracker.
 pub fn advice(config: &Config, interval: Option<f64>) -> Result<Vec<String>, PipelineError> {
     let mut said = Vec::new();
-    let seconds = interval.filter(|seconds| *seconds > 0.0).unwrap_or(1.0);
-    if starts_within(config, seconds)? == Some(false) {
-        said.push(no_start(config, seconds)?);
+    let known = interval.filter(|seconds| *seconds > 0.0).map(|seconds| [seconds]);
+    let intervals = known.as_ref().map_or(&USUAL[..], |known| &known[..]);
+    let mut starts = Vec::with_capacity(intervals.len());
+    for seconds in intervals {
+        starts.push(starts_within(config, *seconds)?);
+    }
+    if starts.iter().all(|starts| *starts == Some(false)) {
+        said.push(no_start(config, intervals[0])?);
     }
     if let Some(seconds) = interval {
         said.extend(idle(config.tracker.management(), seconds));

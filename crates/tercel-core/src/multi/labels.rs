@@ -33,8 +33,6 @@ struct Group {
     lead: usize,
     members: Vec<usize>,
     weight: f64,
-    /// The part of the weight that a measurement of this scan updated.
-    detected: f64,
 }
 
 /// A group stands for one object; another half of one is more than two missed and detected versions add up to.
@@ -99,9 +97,8 @@ impl<B: Clone> Roster<B> {
     }
 
     /// Reads the tracks off terms that are sorted by falling weight. Terms of one label that lie together are one object:
-    /// its existence is the sum of their weights, its belief their merger. It was seen when the sum reaches
-    /// `extract`. A tentative track of less weight was not missed as long as its weight grows and it is more likely seen than not,
-    /// if it is there at all. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
+    /// its existence is the sum of their weights, its belief their merger, and it was seen when the sum reaches
+    /// `extract`. Where a label stands for a second such group, that becomes a new track. Every measurement that updated
     /// a track is marked; the others count as clutter. A track that is gone is reported where it would be now, after a time `dt`.
     pub fn read<const N: usize, F>(
         &mut self,
@@ -160,15 +157,10 @@ impl<B: Clone> Roster<B> {
         let (track, lead) = (&mut self.tracks[at], &terms[group.lead]);
         track.existence = group.weight.min(1.0);
         track.belief = group.belief(filter, terms);
-        let grows = !track.confirmed && group.weight > track.known && group.detected >= 0.5 * group.weight;
         match lead.tag.measurement {
             Some(number) if group.weight >= extract => {
                 track.hit(number, time);
                 track.reports = !lead.tag.in_view;
-            }
-            Some(_) if grows => {
-                track.known = group.weight;
-                track.unseen();
             }
             _ if lead.tag.in_view => track.miss(),
             _ => track.unseen(),
@@ -229,7 +221,6 @@ where
     };
     for (number, term) in terms.iter().enumerate() {
         let groups = all.entry(term.tag.id).or_default();
-        let detected = if term.tag.measurement.is_some() { term.weight } else { 0.0 };
         let home = groups
             .iter_mut()
             .find(|group| group.weight + term.weight <= FULL && together(group.lead, number));
@@ -237,9 +228,8 @@ where
             Some(group) => {
                 group.members.push(number);
                 group.weight += term.weight;
-                group.detected += detected;
             }
-            None => groups.push(Group { lead: number, members: vec![number], weight: term.weight, detected }),
+            None => groups.push(Group { lead: number, members: vec![number], weight: term.weight }),
         }
     }
     all

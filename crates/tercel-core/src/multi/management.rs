@@ -7,14 +7,14 @@ use super::{Status, Track};
 /// ## Which rule ends which track
 /// | rule | a tentative track | a confirmed track |
 /// |---|---|---|
-/// | `min_existence` | ends below it; under [`Confirmation::Hits`] counting alone ends it | ends below it when a measurement has just updated it, for what it takes does not fit, or when the last one left it less likely to exist than not |
+/// | `min_existence` | ends below it; under [`Confirmation::Hits`] counting alone ends it | ends below it when an update has just left it there, or the last one left it doubtful |
 /// | [`Confirmation::Hits`] | ends when it can no longer reach the number | - |
 /// | `lost_existence`, if it is given | - | ends below it; the rule above does not hold then |
 /// | `max_misses`, `max_coast` | ends beyond them | ends beyond them |
 ///
-/// Without `lost_existence`, misses alone never end a confirmed track before `max_misses` or `max_coast` does. If the probability of detection were
-/// constant and known, four misses in a row would leave hardly a doubt that an object is gone; but objects hide behind others
-/// and sensors have bad hours. So one object in a hundred that exists is taken to be hidden, and the existence `r` of a
+/// Without `lost_existence`, misses alone never end a confirmed track before `max_misses` or `max_coast` does, unless its last
+/// update left it less likely to exist than not. If the probability of detection were constant and known, four misses in a row
+/// would leave hardly a doubt that an object is gone; but objects hide behind others and sensors have bad hours. So one object in a hundred that exists is taken to be hidden, and the existence `r` of a
 /// confirmed track at its last update, with survival `s` since, sinks no lower than
 /// ```text
 /// h r s / (h r s + 1 - r s)        h = 0.01

@@ -104,7 +104,7 @@ struct Scratch {
     misses: Vec<f64>,
     /// How each track is seen.
     sights: Vec<Sight>,
-    /// Tracks so doubtful that no measurement, wherever it lies, is more likely theirs than clutter.
+    /// Tracks so doubtful that no measurement, wherever it lies, is more likely theirs than clutter of the background.
     hopeless: Vec<bool>,
     columns: Vec<Option<usize>>,
 }
@@ -151,7 +151,8 @@ impl<B: Clone> NearestNeighbour<B> {
                 let cost = -(track.existence * sight.seen).ln() - innovation.log_likelihood + clutter;
                 if self.config.gate.contains(&innovation) && cost.is_finite() {
                     pairs.push((row, column, cost));
-                    least = least.min(cost - 0.5 * innovation.nis);
+                    let background = filter.ln_clutter(&scan.measurements[column], scan.clutter.background());
+                    least = least.min(cost - 0.5 * innovation.nis - clutter + background);
                 }
             }
             misses.push(miss);
@@ -172,7 +173,7 @@ impl<B: Clone> NearestNeighbour<B> {
         let mut free = vec![true; measurements];
         columns.iter().flatten().for_each(|&column| free[column] = false);
         let Individuals { tracks, active, .. } = &self.objects;
-        pairs.retain(|&(row, column, _)| hopeless[row] && free[column]);
+        pairs.retain(|&(row, column, _)| hopeless[row] && columns[row].is_none() && free[column]);
         if pairs.is_empty() {
             return;
         }

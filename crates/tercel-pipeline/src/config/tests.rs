@@ -111,11 +111,20 @@ fn numbers(schema: &Value, root: &Value, path: &str, found: &mut Vec<(String, Va
 #[test]
 fn every_default_is_that_of_the_library() {
     use tercel_core::multi;
-    assert_eq!(NearestNeighbourConfig::default().build().unwrap(), multi::NearestNeighbourConfig::default());
-    assert_eq!(JpdaConfig::default().build().unwrap(), multi::JpdaConfig::default());
-    assert_eq!(PhdConfig::default().build().unwrap(), multi::PhdConfig::default());
-    assert_eq!(MultiBernoulliConfig::default().build().unwrap(), multi::MultiBernoulliConfig::default());
-    assert_eq!(PmbmConfig::default().build().unwrap(), multi::PmbmConfig::default());
+    // Of equal gates the limits may differ in the last digits, since a constant holds those of the default.
+    macro_rules! same {
+        ($name:ident) => {
+            let (mut built, library) = ($name::default().build().unwrap(), multi::$name::default());
+            assert_eq!(built.gate.probability(), library.gate.probability());
+            built.gate = library.gate;
+            assert_eq!(built, library);
+        };
+    }
+    same!(NearestNeighbourConfig);
+    same!(JpdaConfig);
+    same!(PhdConfig);
+    same!(MultiBernoulliConfig);
+    same!(PmbmConfig);
 }
 
 #[test]
@@ -138,13 +147,12 @@ fn the_schema_tells_the_default_of_each_tracker() {
     let default = |tracker: &str, key: &str| {
         schema
             .pointer(&format!("/$defs/{tracker}/properties/management/default/{key}"))
-            .cloned()
-            .unwrap_or_default()
+            .and_then(Value::as_f64)
     };
-    assert_eq!(default("PmbmConfig", "min_existence"), 1e-4);
-    assert_eq!(default("PhdConfig", "max_misses"), 2);
-    assert_eq!(default("PhdConfig", "confirm/hits/scans"), 4);
-    assert_eq!(default("JpdaConfig", "confirm/existence"), 0.95);
+    assert_eq!(default("PmbmConfig", "min_existence"), Some(1e-4));
+    assert_eq!(default("PhdConfig", "max_misses"), Some(2.0));
+    assert_eq!(default("PhdConfig", "confirm/hits/scans"), Some(4.0));
+    assert_eq!(default("JpdaConfig", "confirm/existence"), Some(0.95));
 }
 
 #[test]

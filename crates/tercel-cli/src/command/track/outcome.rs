@@ -43,7 +43,7 @@ impl Outcome {
         self.left_out.add("a scan that came too late", late_rows);
         self.left_out.add("a time far ahead of all others", ahead_rows);
         self.left_out.add("a sensor that the configuration ignores", ignored_rows);
-        self.left_out.add("a detection that repeats another of its scan", repeated);
+        self.left_out.add("a detection that repeats another one of its scan", repeated);
         self.left_out.add("a line or scan that cannot be used", self.bad);
         let evaluation = match &self.truths {
             Some(truths) => {

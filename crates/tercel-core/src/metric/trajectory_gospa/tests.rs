@@ -224,8 +224,11 @@ fn totals_are_right_for_orders_and_cut_offs_whose_powers_overflow_or_vanish() {
         let error = 1e-3 * cutoff;
         let [truth, track] = off(error);
         assert_eq!(metric.score::<2>(&[], &[]).unwrap().parts.sum(), 0.0);
-        close(metric.score(&[truth.clone()], &[track.clone()]).unwrap(), error * 5f64.powf(order.recip()));
-        close(metric.score(&[truth.clone()], &[]).unwrap(), cutoff * 2.5f64.powf(order.recip()));
+        close(
+            metric.score(std::slice::from_ref(&truth), std::slice::from_ref(&track)).unwrap(),
+            error * 5f64.powf(order.recip()),
+        );
+        close(metric.score(std::slice::from_ref(&truth), &[]).unwrap(), cutoff * 2.5f64.powf(order.recip()));
         // Of two tracks for two objects each takes the nearer, however small the power of both.
         let pair =
             metric.score(&[truth.clone(), line(error, 0..5)], &[line(2.0 * error, 0..5), truth]).unwrap();
@@ -248,7 +251,7 @@ fn a_track_that_is_kept_before_or_beyond_its_meetings_is_free_only_if_nobody_els
     let early = Trajectory::new(5, (5..8).map(|t| [t as f64, 1.0]));
     let late = Trajectory::new(20, (20..24).map(|t| [t as f64, 1.0]));
     let metric = metric(10.0, 1.0, 3.0);
-    let alone = metric.score(&[early.clone()], &[track.clone()]).unwrap();
+    let alone = metric.score(std::slice::from_ref(&early), std::slice::from_ref(&track)).unwrap();
     assert_eq!((alone.switches, alone.parts.localisation), (0.0, 3.0));
     let both = metric.score(&[early, late, line(500.0, 0..30)], &[track]).unwrap();
     assert_eq!((both.switches, both.parts.localisation), (1.0, 7.0));
