@@ -67,7 +67,7 @@ fn a_file_is_sorted_and_ignored_scans_are_counted_with_their_detections() {
     )
     .unwrap();
     let summary = run(["track", text(&table), "--json"].into_iter().chain(CONFIG)).succeeded().json();
-    let scans = serde_json::json!({"read": 5, "tracked": 4, "late": 0, "ignored": 1, "bad": 0});
+    let scans = serde_json::json!({"read": 5, "tracked": 4, "late": 0, "ahead": 0, "ignored": 1, "bad": 0});
     assert_eq!(summary["scans"], scans);
     assert_eq!(summary["detections"]["left_out"], 1);
     assert_eq!(summary["detections"]["tracked"], 5);

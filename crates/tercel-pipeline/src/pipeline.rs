@@ -267,8 +267,9 @@ impl Pipeline {
     /// Tracks a scan. An object that reports twice at one time is one object: its second report is taken after the first.
     fn take(&mut self, look: &Look, reports: bool) -> Result<Vec<Track>, PipelineError> {
         let Some([first, again]) = reports.then(|| repeats::named_again(&look.scan)).flatten() else {
+            let rows = self.step(look)?;
             self.summary.scans += 1;
-            return self.step(look);
+            return Ok(rows);
         };
         let mut rows = self.step(&Look { scan: first, sector: look.sector })?;
         rows.extend(self.take(&Look { scan: again, sector: look.sector }, reports)?);

@@ -65,12 +65,7 @@ impl Tracked {
         self.summary["detections"]["tracked"].as_u64().unwrap()
     }
 
-    /// Detections that became part of a track.
-    fn part_of_tracks(&self) -> u64 {
-        let uses = &self.summary["detections"];
-        uses["updated"].as_u64().unwrap() + uses["started"].as_u64().unwrap()
-    }
-
+    /// Detections that continued a track.
     fn updated(&self) -> u64 {
         self.summary["detections"]["updated"].as_u64().unwrap()
     }

@@ -81,14 +81,13 @@ fn mahalanobis(row: &Value, truth: [f64; 4]) -> f64 {
         })
         .collect();
     let mut distance = 0.0;
-    for pivot in 0..4 {
+    while !rows.is_empty() {
         // A step of elimination leaves the part of the error that those before do not explain.
-        distance += rows[pivot][4].powi(2) / rows[pivot][pivot];
-        for below in pivot + 1..4 {
-            let factor = rows[below][pivot] / rows[pivot][pivot];
-            for column in pivot..5 {
-                rows[below][column] -= factor * rows[pivot][column];
-            }
+        let first = rows.remove(0);
+        distance += first.last().unwrap().powi(2) / first[0];
+        for row in &mut rows {
+            let factor = row[0] / first[0];
+            *row = row.iter().zip(&first).skip(1).map(|(entry, above)| entry - factor * above).collect();
         }
     }
     distance
@@ -118,7 +117,7 @@ fn a_track_that_needs_three_hits_of_five_scans_waits_for_them() {
 #[test]
 fn rows_that_stand_twice_are_counted() {
     let tracked = track("12_every_row_twice", &[]);
-    assert_eq!(tracked.left_out(), [("a detection that repeats another of its scan".to_owned(), 60)]);
+    assert_eq!(tracked.left_out(), [("a detection that repeats another one of its scan".to_owned(), 60)]);
     assert_eq!(tracked.detections(), 60);
     assert_eq!(tracked.summary["detections"]["left_out"], 60);
 }

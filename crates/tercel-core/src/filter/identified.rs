@@ -65,13 +65,14 @@ pub struct NamedBelief<B> {
 /// reliability over open sets of names; the square and the restart are ours.
 ///
 /// ```
-/// use tercel_core::filter::{Filter, Identified, Identity, Kalman, Named};
+/// use tercel_core::belief::Gaussian;
+/// use tercel_core::filter::{Filter, Identified, Identity, Kalman, Named, NamedBelief};
 /// use tercel_core::motion::ConstantVelocity;
 /// use tercel_core::sensor::Position;
 ///
 /// let filter = Identified::new(Kalman::new(ConstantVelocity::new(0.1), Position::new(5.0)?), 0.999)?;
 /// let report = |x: f64, name| Named { measurement: [x, 0.0].into(), identity: Some(Identity(name)) };
-/// let ship = filter.birth(&report(0.0, 7))?;
+/// let ship: NamedBelief<Gaussian<4>> = filter.birth(&report(0.0, 7))?;
 /// let same = filter.innovation(&ship, &report(1.0, 7))?.log_likelihood;
 /// let other = filter.innovation(&ship, &report(1.0, 8))?.log_likelihood;
 /// assert!(same > other + 25.0);

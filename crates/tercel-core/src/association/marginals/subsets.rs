@@ -5,7 +5,8 @@ use super::Local;
 /// Number of steps that [`solve`] takes: a row at a time, for each set of the columns that several rows want.
 pub(super) fn steps(local: &Local) -> usize {
     let contested = local.wanted.iter().filter(|wanted| **wanted > 1).count();
-    u32::try_from(contested).ok().and_then(|bits| local.rows.checked_shl(bits)).unwrap_or(usize::MAX)
+    let states = u32::try_from(contested).ok().and_then(|bits| 1_usize.checked_shl(bits));
+    states.and_then(|states| states.checked_mul(local.rows)).unwrap_or(usize::MAX)
 }
 
 /// Finds the probabilities of the entries. What the rows before one make of each set of columns meets what the rows after it
@@ -105,5 +106,7 @@ impl<'a> Sets<'a> {
 /// Only ratios matter, and products of many weights must stay finite.
 fn scale(weights: &mut [f64]) {
     let top = weights.iter().copied().fold(0.0, f64::max);
-    weights.iter_mut().for_each(|weight| *weight /= top);
+    if top > 0.0 {
+        weights.iter_mut().for_each(|weight| *weight /= top);
+    }
 }
