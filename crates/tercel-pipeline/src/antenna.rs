@@ -41,6 +41,7 @@ impl Antenna {
 
     /// The antenna that made these plots, whatever its period; nothing when they do not show one.
     pub fn of_plots(glances: &[Glance]) -> Option<Antenna> {
+        let glances = middle(glances);
         let (first, last) = (glances.first()?.0, glances.last()?.0);
         let span = last - first;
         if glances.len() < ENOUGH || span < 2.0 * PERIODS.0 {
@@ -79,6 +80,16 @@ impl Antenna {
             self.phase += FOLLOW * ahead;
         }
     }
+}
+
+/// The plots around the one in the middle: enough turns to see how the antenna turns. The search takes a time that grows with
+/// theirs, and one wrong time would make that centuries.
+fn middle(glances: &[Glance]) -> &[Glance] {
+    let Some(centre) = glances.get(glances.len() / 2).map(|glance| glance.0) else { return glances };
+    let near = |glance: &Glance| (glance.0 - centre).abs() <= 5.0 * PERIODS.1;
+    let from = glances.iter().position(near).unwrap_or(0);
+    let count = glances[from..].iter().take_while(|glance| near(glance)).count();
+    &glances[from..from + count]
 }
 
 /// Length and direction of the mean of the plots' directions, seen from an antenna that makes `rate` turns a second.
@@ -133,6 +144,15 @@ mod tests {
             let (time, bearing) = glances[40];
             assert!(tercel_core::sensor::wrapped(antenna.bearing(time) - bearing).abs() < 0.1);
         }
+    }
+
+    #[test]
+    fn one_wrong_time_hides_no_antenna() {
+        let mut glances = plots(&[0.3, 1.9, -2.4, 2.9, -0.8], 4.0, -1.0, 16);
+        glances.iter_mut().for_each(|glance| glance.0 += 1.7e9);
+        glances.insert(0, (0.0, 0.1));
+        let antenna = Antenna::of_plots(&glances).unwrap();
+        assert!((antenna.period / 4.0 - 1.0).abs() < 2e-3, "{antenna:?}");
     }
 
     #[test]

@@ -147,6 +147,16 @@ fn times_may_be_negative() {
 }
 
 #[test]
+fn one_time_that_is_zero_costs_one_row_and_no_time() {
+    let mut text = "time,sensor,x,y\n0,radar,70,35\n".to_owned();
+    for [time, x, y] in plots(30).into_iter().step_by(2) {
+        writeln!(text, "{},radar,{x:.3},{y:.3}", 1_709_632_800.0 + time).unwrap();
+    }
+    let tracked = Tracked::of_text("plots.csv", &text, &[]);
+    assert_eq!((tracked.tracks(), tracked.updated()), (1, 29), "{}\n{}", tracked.summary, tracked.stderr);
+}
+
+#[test]
 fn scans_at_one_time_are_all_used() {
     let mut text = "time,sensor,scan,x,y\n".to_owned();
     for (row, [time, x, y]) in plots(20).into_iter().enumerate() {
