@@ -163,7 +163,7 @@ impl Kind {
 
 /// The detections of a scan as positions.
 pub(crate) fn positions(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> {
-    collect(scan, "position", "polar", |detection, age| match detection.observation {
+    collect(scan, "position", |detection, age| match detection.observation {
         Observation::Position { x, y, .. } => {
             let noise = diagonal([detection.noise.x, detection.noise.y]);
             Some(Measurement { value: vector![x, y], noise, age })
@@ -174,7 +174,7 @@ pub(crate) fn positions(scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineErro
 
 /// The detections of a scan as ranges and bearings.
 pub(crate) fn ranges(station: &Station, scan: &Scan) -> Result<Vec<Measurement<2>>, PipelineError> {
-    collect(scan, "range and bearing", "position", |detection, age| match detection.observation {
+    collect(scan, "range and bearing", |detection, age| match detection.observation {
         Observation::Polar { range: Some(range), bearing, z, .. } => {
             let (range, noise, _) = station.slant.over_ground(range, z, &detection.noise);
             let noise = diagonal([noise.range, noise.bearing]);
@@ -186,7 +186,7 @@ pub(crate) fn ranges(station: &Station, scan: &Scan) -> Result<Vec<Measurement<2
 
 /// The detections of a scan as ranges, bearings and range rates.
 pub(crate) fn range_rates(station: &Station, scan: &Scan) -> Result<Vec<Measurement<3>>, PipelineError> {
-    collect(scan, "range, bearing and range rate", "position", |detection, age| match detection.observation {
+    collect(scan, "range, bearing and range rate", |detection, age| match detection.observation {
         Observation::Polar { range: Some(range), bearing, range_rate: Some(rate), z } => {
             let (range, noise, stretch) = station.slant.over_ground(range, z, &detection.noise);
             let noise = diagonal([noise.range, noise.bearing, noise.range_rate]);
@@ -198,7 +198,7 @@ pub(crate) fn range_rates(station: &Station, scan: &Scan) -> Result<Vec<Measurem
 
 /// The detections of a scan as bearings.
 pub(crate) fn bearings(scan: &Scan) -> Result<Vec<Measurement<1>>, PipelineError> {
-    collect(scan, "bearing", "position", |detection, age| match detection.observation {
+    collect(scan, "bearing", |detection, age| match detection.observation {
         Observation::Polar { bearing, .. } => {
             Some(Measurement { value: vector![bearing], noise: diagonal([detection.noise.bearing]), age })
         }
@@ -206,12 +206,10 @@ pub(crate) fn bearings(scan: &Scan) -> Result<Vec<Measurement<1>>, PipelineError
     })
 }
 
-/// Measures every detection of a scan; the first that is not of the expected kind is an error, with a hint at the kind of
-/// sensor that the configuration may have meant.
+/// Measures every detection of a scan; the first that is not of the expected kind is an error, with the section that fits it.
 fn collect<const M: usize>(
     scan: &Scan,
     expected: &'static str,
-    instead: &str,
     measure: impl Fn(&table::Detection, f64) -> Option<Measurement<M>>,
 ) -> Result<Vec<Measurement<M>>, PipelineError> {
     let one = |detection: &table::Detection| {
@@ -221,13 +219,30 @@ fn collect<const M: usize>(
             sensor: scan.sensor.to_string(),
             detection: detection.id,
             expected,
-            help: format!(
-                "say what it measures: [sensors.{}] measures = {{ {instead} = {{ .. }} }}",
-                scan.sensor
-            ),
+            help: section(&scan.sensor, &detection.observation),
         })
     };
     scan.detections.iter().map(one).collect()
+}
+
+/// A section for a sensor that gives such detections, to be pasted into a configuration.
+fn section(sensor: &str, seen: &Observation) -> String {
+    const PLANE: &str = "clutter = { uniform = { density = 1e-6 } }    # false detections per scan and m²";
+    const ANGLE: &str = "clutter = { uniform = { density = 0.1 } }    # false detections per scan and rad";
+    let (what, measures, clutter) = match seen {
+        Observation::Position { .. } => ("positions", "{ position = { deviation = 10.0 } }    # m", PLANE),
+        Observation::Polar { range: Some(_), .. } => (
+            "ranges and bearings",
+            "{ polar = { range_deviation = 20.0, bearing_deviation = 0.01 } }    # m, rad",
+            PLANE,
+        ),
+        Observation::Polar { range: None, .. } => {
+            ("bearings", "{ bearing = { deviation = 0.02 } }    # rad", ANGLE)
+        }
+    };
+    format!(
+        "it gives {what}; with its own numbers that is\n    [sensors.{sensor}]\n    measures = {measures}\n    {clutter}"
+    )
 }
 
 /// A diagonal covariance, if all its deviations came with the detection.

@@ -117,7 +117,7 @@ fn a_track_that_needs_three_hits_of_five_scans_waits_for_them() {
 #[test]
 fn rows_that_stand_twice_are_counted() {
     let tracked = track("12_every_row_twice", &[]);
-    assert_eq!(tracked.left_out(), [("a detection that repeats another one of its scan".to_owned(), 60)]);
+    assert_eq!(tracked.left_out(), [("a detection that repeats another of its scan".to_owned(), 60)]);
     assert_eq!(tracked.detections(), 60);
     assert_eq!(tracked.summary["detections"]["left_out"], 60);
 }

@@ -75,7 +75,7 @@ pub struct NamedBelief<B> {
 /// let ship: NamedBelief<Gaussian<4>> = filter.birth(&report(0.0, 7))?;
 /// let same = filter.innovation(&ship, &report(1.0, 7))?.log_likelihood;
 /// let other = filter.innovation(&ship, &report(1.0, 8))?.log_likelihood;
-/// assert!(same > other + 25.0);
+/// assert!(same > other + 15.0);
 /// # Ok::<(), tercel_core::error::FilterError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
