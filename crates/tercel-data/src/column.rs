@@ -132,11 +132,12 @@ impl Column {
         if limits != Limits::Angle {
             return limits.check(value * conversion.factor);
         }
-        let angle = conversion.turned(Limits::Finite.check(value)? * conversion.factor);
+        let value = Limits::Finite.check(value)?;
         // More than a turn in radians is a sign of degrees.
-        let plain = !conversion.compass && conversion.factor == 1.0;
-        let fits = !plain || angle.abs() <= 2.0 * PI;
-        limits.check(if fits { wrapped(angle) } else { angle })
+        if conversion.factor == 1.0 && value.abs() > 2.0 * PI {
+            return limits.check(value);
+        }
+        limits.check(wrapped(conversion.turned(value * conversion.factor)))
     }
 
     /// Refuses a number that no reader would take.
@@ -252,6 +253,8 @@ mod tests {
         let refusal = BEARING.real_from(271.4, Conversion::NONE).unwrap_err();
         assert!(refusal.help.unwrap().contains("--angles degrees"));
         assert!((BEARING.real_from(6.0, Conversion::NONE).unwrap() - (6.0 - 2.0 * PI)).abs() < 1e-15);
+        let compass = Conversion { compass: true, ..Conversion::NONE };
+        assert!(BEARING.real_from(359.0, compass).unwrap_err().help.unwrap().contains("--angles degrees"));
     }
 
     #[test]

@@ -47,6 +47,9 @@ impl Understood {
 /// Scans of a sensor that say what it is, at least.
 const ENOUGH: usize = 8;
 
+/// Share of the scans that hold one detection, where detections have times of their own.
+const SINGLE: f64 = 0.9;
+
 /// Scans of a sensor that are looked at, at most.
 const LOOKED_AT: usize = 512;
 
@@ -70,16 +73,19 @@ pub(crate) fn sensor(
         return Some(Understood::Reports);
     }
     let scans: Vec<&Scan> = first.iter().filter(|scan| scan.sensor == *name).take(LOOKED_AT).collect();
-    if scans.len() < ENOUGH {
+    let count = scans.len();
+    if count < ENOUGH {
         return None;
     }
     if names_are_seldom(&scans) {
         return Some(Understood::Reports);
     }
-    // One detection in each scan, each at a time of its own: a radar that turns, or objects that report.
-    let single = scans.iter().all(|scan| scan.detections.len() == 1);
+    // One detection in each scan, each at a time of its own: a radar that turns, or objects that report. Two may share a
+    // time, as clocks of milliseconds go.
     let rising = scans.windows(2).all(|pair| pair[0].time < pair[1].time);
-    if !single || !rising {
+    let filled = scans.iter().all(|scan| !scan.detections.is_empty());
+    let scans: Vec<&Scan> = scans.iter().copied().filter(|scan| scan.detections.len() == 1).collect();
+    if !rising || !filled || (scans.len() as f64) < SINGLE * count as f64 {
         return None;
     }
     let place = Vector2::from(config.position);
@@ -127,4 +133,39 @@ fn interleaved(scans: &[&Scan]) -> bool {
 fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use tercel_data::table::Detection;
+
+    #[test]
+    fn two_plots_at_one_time_do_not_hide_an_antenna() {
+        let config = Config::parse(
+            "[motion]\nconstant_velocity = { acceleration_density = 1.0, speed = 100.0 }\n[sensors.radar]\n\
+             measures = { polar = { range_deviation = 50.0, bearing_deviation = 0.01 } }\n\
+             clutter = { uniform = { density = 1e-9 } }\n",
+        )
+        .unwrap();
+        let plot = |bearing: f64| {
+            Detection::new(0, Observation::Polar { range: Some(9e3), bearing, range_rate: None, z: None })
+        };
+        let mut scans = Vec::new();
+        for turn in 0..16 {
+            for bearing in [0.3, 1.9, 2.9, -2.4, -0.9_f64] {
+                let time = 4.0
+                    * (f64::from(turn) + bearing.rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU);
+                scans.push(Scan::new(time, "radar", vec![plot(bearing)]));
+            }
+        }
+        scans[7].detections.push(plot(1.9));
+        let found =
+            sensor(&"radar".into(), &config.sensors["radar"], &Description::default(), &scans).unwrap();
+        assert!(
+            matches!(found, Understood::Turns(antenna) if (antenna.period - 4.0).abs() < 0.01),
+            "{found:?}"
+        );
+    }
 }

@@ -131,8 +131,9 @@ impl Management {
 
     /// For how long a track may be silent, s.
     fn coast<B>(&self, track: &Track<B>) -> f64 {
-        let coast =
-            self.max_coast.unwrap_or_else(|| COAST.max((f64::from(self.max_misses) + 1.0) * track.pace));
+        let coast = self.max_coast.unwrap_or_else(|| {
+            COAST.max((f64::from(self.max_misses) + 1.0) * track.pace.max(track.interval))
+        });
         if track.reports { coast.max(PATIENCE * track.interval) } else { coast }
     }
 

@@ -59,6 +59,7 @@ impl Outcome {
         }
         self.run.finish(console)?;
         self.left_out.say_briefly(console);
+        self.warn_of_nothing(console);
         if arguments.json {
             return print_json(&self.json(arguments, evaluation));
         }
@@ -69,6 +70,23 @@ impl Outcome {
             _ => print(&table)?,
         }
         Ok(())
+    }
+
+    /// No tracks are never left without a word.
+    fn warn_of_nothing(&self, console: &Console) {
+        const ENOUGH: u64 = 20;
+        let summary = self.run.summary();
+        let detections = summary.updates + summary.starts + summary.clutter;
+        if summary.confirmed == 0 && detections >= ENOUGH {
+            console.warn(format_args!(
+                "no track is believed: {} of {} started one, {} updated one; are the speed of new objects, the deviations and the \
+                 clutter density those of this sensor? Plots of an antenna that turns need scans = {{ period = SECONDS }}, reports \
+                 kind = \"reports\"",
+                count(summary.starts),
+                counted(detections, "detection"),
+                count(summary.updates)
+            ));
+        }
     }
 
     /// Names and values of the figures that need no truth.
